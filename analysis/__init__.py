@@ -1,0 +1,1 @@
+"""Sessions to results: pure functions without plots or printing."""

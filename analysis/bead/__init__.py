@@ -1,0 +1,1 @@
+"""Bead metrology from photos: strip, toes, width and its uniformity."""

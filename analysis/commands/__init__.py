@@ -1,0 +1,1 @@
+"""Commands of the analysis: identify, replay and analyze."""

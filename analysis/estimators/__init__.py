@@ -1,0 +1,1 @@
+"""Estimators of the table's parameters, found by name."""

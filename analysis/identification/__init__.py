@@ -1,0 +1,1 @@
+"""Identification of inertia and friction from recorded motion, with uncertainty."""

@@ -1,0 +1,1 @@
+"""Logged inputs through controllers and estimators again: shadow and counterfactual."""

@@ -1,0 +1,1 @@
+"""Importers that turn foreign files into sessions."""

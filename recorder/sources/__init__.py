@@ -1,0 +1,1 @@
+"""Sources that a recording can be made from: cameras, encoders, replayed files."""

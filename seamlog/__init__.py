@@ -1,0 +1,1 @@
+"""Sessions of robotic seam-tracking welds: record, analyse, replay and report."""

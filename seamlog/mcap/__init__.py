@@ -1,0 +1,1 @@
+"""The MCAP codec: columnar reader, batch writer, message packing and attachments."""
