@@ -1,0 +1,5 @@
+"""`python -m seamlog`."""
+
+from seamlog.cli import main
+
+main()
