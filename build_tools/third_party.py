@@ -40,15 +40,13 @@ SHORT = {
 
 def licence_of(found: Distribution) -> str:
     """The SPDX expression of a distribution, else its short licence text, else its classifier."""
-    metadata = found.metadata
-    if expression := metadata.get("License-Expression"):
-        return expression
-    text = (metadata.get("License") or "").strip()
-    if text and "\n" not in text and len(text) < 40:
-        return SHORT.get(text, text)
+    for field in ("License-Expression", "License"):
+        text = str((found.metadata.get_all(field) or [""])[0]).strip()
+        if text and "\n" not in text and len(text) < 60:
+            return SHORT.get(text, text)
     marks = [
         mark.rsplit(" :: ", 1)[-1]
-        for mark in metadata.get_all("Classifier", [])
+        for mark in found.metadata.get_all("Classifier") or []
         if mark.startswith("License ::")
     ]
     return ", ".join(SHORT.get(mark, mark) for mark in marks) or "see its package"
