@@ -116,7 +116,7 @@ def run(arguments: list[str]) -> int:
     """Run one command line and return its exit code; nothing escapes but the code."""
     as_json = "--json" in arguments
     try:
-        outcome = _invoke(arguments)
+        outcome = invoke(arguments)
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
     except BaseException as error:  # noqa: BLE001 - the one place that turns all into codes
@@ -128,10 +128,12 @@ def run(arguments: list[str]) -> int:
     return ExitCode.PASS
 
 
-def _invoke(arguments: list[str]) -> object:
-    if not arguments:
-        arguments = ["--help"]
-    with seamlog.make_context("seamlog", list(arguments)) as context:
+def invoke(arguments: list[str]) -> object:
+    """Run one command line and hand its `Outcome` back; errors pass through.
+
+    For commands that chain others (`demo`): they reach them by name, as a person would.
+    """
+    with seamlog.make_context("seamlog", arguments or ["--help"]) as context:
         return seamlog.invoke(context)
 
 
@@ -196,8 +198,6 @@ def _plain(value: Any) -> Any:
         return value.item()
     return str(value)
 
-
-__all__ = ["COMMANDS", "ExitCode", "main", "run", "seamlog"]
 
 if __name__ == "__main__":
     main()

@@ -244,8 +244,9 @@ class Results:
         return TableFile(file=path.name, rows=table.num_rows, columns=named, sha256=digest)
 
     def parts(self) -> list[Part]:
-        """All parts, by file name."""
-        return [self._read(path) for path in self._part_files()]
+        """All parts, by name and index."""
+        found = (self._read(path) for path in self._part_files())
+        return sorted(found, key=lambda part: (part.part, part.index))
 
     def _read(self, path: Path) -> Part:
         try:
