@@ -1,0 +1,79 @@
+"""Chunk compression. Decompression counts bytes: no chunk grows beyond the size it declares."""
+
+import lz4.frame
+import zstandard
+
+from seamlog.errors import LimitExceeded
+from seamlog.mcap.records import Buffer, Malformed
+
+ZSTD, LZ4, NONE = "zstd", "lz4", ""
+COMPRESSIONS = (ZSTD, LZ4, NONE)
+_LEVEL = 1
+
+_compressor: zstandard.ZstdCompressor | None = None
+
+
+def compress(data: Buffer, compression: str) -> Buffer:
+    """`data` as the body of a chunk; `ValueError` for an unknown compression."""
+    if compression == ZSTD:
+        return _zstd_compressor().compress(data)
+    if compression == LZ4:
+        packed: bytes = lz4.frame.compress(data)
+        return packed
+    if compression == NONE:
+        return data
+    raise ValueError(f"compression {compression!r} is none of {COMPRESSIONS}")
+
+
+def _zstd_compressor() -> zstandard.ZstdCompressor:
+    global _compressor
+    if _compressor is None:
+        _compressor = zstandard.ZstdCompressor(level=_LEVEL)
+    return _compressor
+
+
+def decompress(data: Buffer, compression: str, size: int, limit: int) -> Buffer:
+    """The body of a chunk that declares `size` bytes.
+
+    Raises `LimitExceeded` above `limit` bytes and `Malformed` if the body is not what it says.
+    """
+    if size > limit:
+        raise LimitExceeded(
+            f"a chunk declares {size} bytes, more than the limit chunk_bytes = {limit}"
+        )
+    if compression == ZSTD:
+        return _unzstd(data, size)
+    if compression == LZ4:
+        return _unlz4(data, size)
+    if compression == NONE:
+        return data
+    raise Malformed(f"compression {compression!r} is unknown; known are zstd, lz4 and none")
+
+
+def _unzstd(data: Buffer, size: int) -> Buffer:
+    decompressor = zstandard.ZstdDecompressor()
+    try:
+        declared = zstandard.frame_content_size(data)
+        if declared == size:
+            return decompressor.decompress(data, allow_extra_data=False)
+        reader = decompressor.stream_reader(data, read_across_frames=True)
+        unpacked = reader.read(size + 1)
+    except zstandard.ZstdError as error:
+        raise Malformed(f"zstd: {error}") from error
+    return _checked(unpacked, size)
+
+
+def _unlz4(data: Buffer, size: int) -> Buffer:
+    try:
+        with lz4.frame.LZ4FrameDecompressor() as decompressor:
+            unpacked: bytes = decompressor.decompress(data, max_length=size + 1)
+    except RuntimeError as error:
+        raise Malformed(f"lz4: {error}") from error
+    return _checked(unpacked, size)
+
+
+def _checked(unpacked: bytes, size: int) -> bytes:
+    if len(unpacked) != size:
+        more = "more" if len(unpacked) > size else "fewer"
+        raise Malformed(f"a chunk holds {more} bytes than the {size} that it declares")
+    return unpacked
