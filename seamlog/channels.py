@@ -1,7 +1,8 @@
 """The one table of topics: name, message, fields, units, nominal rate and meaning.
 
 The writer, the reader and the documentation (`python -m seamlog.channels`) come from it.
-Field types are those of ROS 2 messages. Our own messages begin with `int64 stamp_ns`, the time
+Field types are those of ROS 2 messages; nested ones are written flat, which is the same in CDR.
+Our own messages begin with `int64 stamp_ns`, the time
 of the physical event (exposure, sample) in nanoseconds since 1970; log time is its arrival.
 """
 
@@ -73,13 +74,17 @@ def _u8(name: str, meaning: str) -> Field:
     return Field("uint64", name, "1", meaning)
 
 
+_HEADER = (
+    Field("builtin_interfaces/Time", "stamp_ns", "ns", "time of the exposure"),
+    Field("string", "frame_id", "", "camera frame"),
+)
+
 _TABLE = (
     Channel(
         "/camera/image",
         IMAGE_SCHEMA,
         (
-            Field("builtin_interfaces/Time", "stamp_ns", "ns", "time of the exposure"),
-            Field("string", "frame_id", "", "camera frame"),
+            *_HEADER,
             Field("string", "format", "", "jpeg or png"),
             Field("uint8[]", "data", "", "encoded picture"),
         ),
@@ -89,7 +94,23 @@ _TABLE = (
     Channel(
         "/camera/info",
         CAMERA_INFO_SCHEMA,
-        (),
+        (
+            *_HEADER,
+            Field("uint32", "height", "px", "rows of the picture"),
+            Field("uint32", "width", "px", "columns of the picture"),
+            Field("string", "distortion_model", "", "plumb_bob or rational_polynomial"),
+            Field("float64[]", "d", "", "distortion coefficients"),
+            Field("float64[9]", "k", "px", "intrinsic matrix, row by row"),
+            Field("float64[9]", "r", "", "rectification matrix"),
+            Field("float64[12]", "p", "px", "projection matrix"),
+            Field("uint32", "binning_x", "", "0 or 1: none"),
+            Field("uint32", "binning_y", "", "0 or 1: none"),
+            Field("uint32", "roi.x_offset", "px", "region of interest"),
+            Field("uint32", "roi.y_offset", "px", "region of interest"),
+            Field("uint32", "roi.height", "px", "0: whole picture"),
+            Field("uint32", "roi.width", "px", "0: whole picture"),
+            Field("bool", "roi.do_rectify", "", "region of the rectified picture"),
+        ),
         None,
         "camera model: size, lens distortion, intrinsic matrix",
     ),

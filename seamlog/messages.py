@@ -32,6 +32,8 @@ PRIMITIVES = {
 }
 """ROS 2 primitive type to `struct` code; `string` is the only other one."""
 
+TIME = "builtin_interfaces/Time"
+
 _SEPARATOR = "=" * 80
 _HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
 _TIME = "int32 sec\nuint32 nanosec\n"
@@ -139,7 +141,15 @@ class CdrWriter:
         self._data = bytearray(CDR_HEADER)
 
     def put(self, kind: str, value: Any) -> None:
-        """Append a value of ROS 2 type `kind`: a primitive, `string`, array or sequence of them."""
+        """Append a value of ROS 2 type `kind`: a primitive, `string`, array or sequence of them.
+
+        A `builtin_interfaces/Time` is given as nanoseconds since 1970.
+        """
+        if kind == TIME:
+            seconds, nanoseconds = divmod(value, 1_000_000_000)
+            self._one("int32", seconds)
+            self._one("uint32", nanoseconds)
+            return
         base, count = split_array(kind)
         if count is None:
             self._one(base, value)
@@ -181,7 +191,7 @@ class CdrWriter:
 
 
 def encode(channel: Channel, values: Sequence[Any]) -> bytes:
-    """CDR payload of one of our own messages; `values` in the order of the table."""
+    """CDR payload of a message; `values` in the order of the table."""
     writer = CdrWriter()
     for field, value in zip(channel.fields, values, strict=True):
         writer.put(field.type, value)
@@ -190,11 +200,4 @@ def encode(channel: Channel, values: Sequence[Any]) -> bytes:
 
 def encode_image(stamp_ns: int, frame_id: str, image_format: str, data: bytes) -> bytes:
     """CDR payload of a sensor_msgs/msg/CompressedImage."""
-    writer = CdrWriter()
-    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    writer.put("int32", seconds)
-    writer.put("uint32", nanoseconds)
-    writer.put("string", frame_id)
-    writer.put("string", image_format)
-    writer.put("uint8[]", data)
-    return writer.payload()
+    return encode(CHANNELS["/camera/image"], (stamp_ns, frame_id, image_format, data))

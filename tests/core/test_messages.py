@@ -79,6 +79,35 @@ def test_pictures_are_compressed_images() -> None:
     assert CHANNELS["/camera/image"].schema == IMAGE_SCHEMA
 
 
+def test_camera_info_is_read_by_rosbags() -> None:
+    channel = CHANNELS["/camera/info"]
+    k, r, p = list(range(9)), [0.5] * 9, list(range(12))
+    values = (
+        5_000_000_007,
+        "cam",
+        480,
+        640,
+        "plumb_bob",
+        [0.1, 0.2],
+        k,
+        r,
+        p,
+        1,
+        1,
+        2,
+        3,
+        4,
+        5,
+        True,
+    )
+    message = oracle(channel, encode(channel, values))
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
+    assert (message.height, message.width, message.roi.width) == (480, 640, 5)
+    np.testing.assert_array_equal(message.k, k)
+    np.testing.assert_array_equal(message.p, p)
+    assert message.roi.do_rectify
+
+
 def test_camera_info_is_the_standard_definition() -> None:
     channel = CHANNELS["/camera/info"]
     store = get_typestore(Stores.ROS2_HUMBLE)
