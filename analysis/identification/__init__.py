@@ -1,1 +1,1 @@
-"""Identification of inertia and friction from recorded motion, with uncertainty."""
+"""Identification: inertia and friction of the axis from logged motion and commands, with doubt."""
