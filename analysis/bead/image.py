@@ -1,0 +1,102 @@
+"""Photos: decoded within limits, upright, as linear opponent channels (lightness and two colours)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from seamlog.errors import ImageError, LimitExceeded
+from seamlog.limits import LIMITS, Limits
+
+from .image_header import picture_size
+
+OPPONENT = np.array([[0.25, 0.5, 0.25], [0.0, -1.0, 1.0], [-1.0, 0.5, 0.5]], dtype=np.float32)
+"""Lightness, red - green and yellow - blue from B, G, R. Linear: a blurred edge stays in place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Photo:
+    """A decoded photo, upright.
+
+    `pixels` has shape (rows, columns) for grey or (rows, columns, 3) for B, G, R; uint8 or uint16.
+    Pixel centres lie at whole numbers; x_px counts columns, y_px rows.
+    """
+
+    pixels: NDArray[Any]
+    name: str
+
+    @property
+    def height_px(self) -> int:
+        """Rows."""
+        return int(self.pixels.shape[0])
+
+    @property
+    def width_px(self) -> int:
+        """Columns."""
+        return int(self.pixels.shape[1])
+
+    def opponent(self, rows: slice = slice(None), columns: slice = slice(None)) -> NDArray[Any]:
+        """The part as float32 (rows, columns, 3): lightness 0-255, red - green, yellow - blue.
+
+        Grey photos have one channel only, shape (rows, columns, 1).
+        """
+        part = self.pixels[rows, columns]
+        scale = np.float32(1 / 257 if part.dtype == np.uint16 else 1)
+        if part.ndim == 2:
+            return np.asarray(part, dtype=np.float32)[..., None] * scale
+        return cv2.transform(np.asarray(part, dtype=np.float32), OPPONENT * scale)
+
+    def as_bgr8(self) -> NDArray[np.uint8]:
+        """A copy for drawing, uint8 (rows, columns, 3)."""
+        pixels = self.pixels if self.pixels.dtype == np.uint8 else (self.pixels >> 8)
+        pixels = pixels.astype(np.uint8)
+        return cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels.copy()
+
+
+def load_photo(path: Path, limits: Limits = LIMITS) -> Photo:
+    """Read a photo file; `ImageError` if it is no whole picture, `LimitExceeded` if too large."""
+    if not path.is_file():
+        raise ImageError(f"{path}: no such photo; check the name")
+    return decode_photo(path.read_bytes(), str(path), limits)
+
+
+def decode_photo(data: bytes, name: str, limits: Limits = LIMITS) -> Photo:
+    """Decode a photo: the header's size is checked first, the orientation flag is obeyed.
+
+    Alpha is left out; palettes become colours; depths other than 8 and 16 bit are refused.
+    """
+    width, height = picture_size(data, name)
+    if width * height > limits.image_pixels:
+        raise LimitExceeded(
+            f"{name} has {width} x {height} px, more than the limit of {limits.image_pixels}; "
+            "crop or reduce it"
+        )
+    if width < 16 or height < 16:
+        raise ImageError(f"{name} has {width} x {height} px: nothing can be measured in it")
+    flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
+    except cv2.error as error:
+        raise ImageError(f"{name} cannot be decoded: {error.err}; copy the file again") from error
+    if pixels is None:
+        raise ImageError(f"{name} cannot be decoded; it is damaged or cut: copy the file again")
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise ImageError(f"{name} holds {pixels.dtype} pixels; save it with 8 or 16 bit")
+    return make_photo(pixels, name)
+
+
+def make_photo(pixels: NDArray[Any], name: str) -> Photo:
+    """A photo from decoded uint8 or uint16 pixels; three equal channels become one."""
+    if pixels.ndim == 3 and pixels.shape[2] == 1:
+        pixels = pixels[..., 0]
+    if pixels.ndim == 3 and _is_grey(pixels):
+        pixels = np.ascontiguousarray(pixels[..., 0])
+    return Photo(pixels, name)
+
+
+def _is_grey(pixels: NDArray[Any]) -> bool:
+    first = pixels[..., 0]
+    return bool((first == pixels[..., 1]).all() and (first == pixels[..., 2]).all())
