@@ -1,1 +1,1 @@
-"""Importers that turn foreign files into sessions."""
+"""Importers: foreign logs become sessions, with a report of what was left behind."""
