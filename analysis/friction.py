@@ -1,0 +1,52 @@
+"""Friction of the ball-screw axis: the set-valued law of the plant, the shape of the controller."""
+
+import math
+
+from seamlog.contracts import Axis
+
+from .deterministic import arctangent, exponential, log_one_plus
+
+_TWO_OVER_PI = 0.6366197723675814
+
+
+def friction_shape(velocity_m_s: float, dead_zone_m_s: float) -> float:
+    """Eq. 3 without C and b: (2/pi) atan((v/alpha)^9), dimensionless, in (-1, 1)."""
+    ratio = velocity_m_s / dead_zone_m_s
+    cube = ratio * ratio * ratio
+    return _TWO_OVER_PI * arctangent(cube * cube * cube)
+
+
+def arctangent_sign(velocity: float) -> float:
+    """Eq. 17 without C: (2/pi) atan(1e6 v), whose width depends on the unit of `velocity`."""
+    return _TWO_OVER_PI * arctangent(1e6 * velocity)
+
+
+def sliding_friction(axis: Axis, speed_m_s: float) -> float:
+    """Eq. 2 without the viscous part, at `speed_m_s` >= 0, in the axis' command unit."""
+    if axis.stribeck_speed_m_s <= 0.0:
+        return axis.coulomb_friction
+    ratio = speed_m_s / axis.stribeck_speed_m_s
+    if ratio > 1e3:
+        return axis.coulomb_friction
+    if axis.stribeck_power == 2.0:
+        ratio = ratio * ratio
+    elif axis.stribeck_power != 1.0 and ratio > 0.0:
+        ratio = exponential(axis.stribeck_power * log_one_plus(ratio - 1.0))
+    excess = max(axis.static_friction, axis.coulomb_friction) - axis.coulomb_friction
+    return axis.coulomb_friction + excess * exponential(-ratio)
+
+
+def smallest_dead_zone_m_s(axis: Axis) -> float:
+    """Eq. 5: the alpha below which the friction shape overtakes the Stribeck curve, m/s.
+
+    rho(delta) v_s, where rho is the largest r tan(pi/2 exp(-r^delta))^(1/9): the shape must stay
+    below 1 - exp(-r^delta) at every speed r v_s. 3.48 for delta = 1, 1.353 for delta = 2.
+    """
+    if axis.static_friction <= axis.coulomb_friction:
+        return 0.0
+    ratios = (0.01 * k for k in range(1, 2000))
+    return axis.stribeck_speed_m_s * max(_overtaking(r, axis.stribeck_power) for r in ratios)
+
+
+def _overtaking(ratio: float, power: float) -> float:
+    return float(ratio * math.tan(0.5 * math.pi * math.exp(-(ratio**power))) ** (1.0 / 9.0))
