@@ -246,6 +246,10 @@ class Cursor:
             raise Malformed(f"{size} bytes wanted where {self.left} are left")
         self.at += size
 
+    def align(self, width: int) -> None:
+        """Skip to the next multiple of `width`, as CDR pads."""
+        self._step(-self.at % width)
+
     def u16(self) -> int:
         """The next uint16."""
         return self.unpack(_U16)[0]

@@ -1,0 +1,140 @@
+"""What is in an MCAP file and where, from its summary, else from a walk over the records."""
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from seamlog.errors import SessionError
+from seamlog.limits import LIMITS, Limits
+from seamlog.mcap import records
+from seamlog.mcap.records import (
+    AttachmentEntry,
+    ChannelRecord,
+    ChunkEntry,
+    Malformed,
+    MetadataEntry,
+    Schema,
+    Statistics,
+)
+from seamlog.mcap.source import FileSource
+
+
+@dataclass(slots=True)
+class FileIndex:
+    """Table of contents of one file; `problems` says in words what is missing or damaged."""
+
+    profile: str = ""
+    library: str = ""
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, ChannelRecord] = field(default_factory=dict)
+    chunks: list[ChunkEntry] = field(default_factory=list)
+    attachments: list[AttachmentEntry] = field(default_factory=list)
+    metadata: list[MetadataEntry] = field(default_factory=list)
+    statistics: Statistics = field(default_factory=Statistics)
+    problems: list[str] = field(default_factory=list)
+
+    def learn(self, opcode: int, content: memoryview) -> None:
+        """Take in a schema, channel or index record."""
+        if opcode == records.SCHEMA:
+            schema = records.parse_schema(content)
+            self.schemas.setdefault(schema.id, schema)
+        elif opcode == records.CHANNEL:
+            channel = records.parse_channel(content)
+            self.channels.setdefault(channel.id, channel)
+        elif opcode == records.CHUNK_INDEX:
+            self.chunks.append(records.parse_chunk_index(content))
+        elif opcode == records.ATTACHMENT_INDEX:
+            self.attachments.append(records.parse_attachment_index(content))
+        elif opcode == records.METADATA_INDEX:
+            self.metadata.append(records.parse_metadata_index(content))
+        elif opcode == records.STATISTICS:
+            self.statistics = records.parse_statistics(content)
+
+
+def load_index(source: FileSource, limits: Limits = LIMITS) -> FileIndex:
+    """The table of contents of `source`.
+
+    A file without a usable summary is walked record by record, and the problem noted. Raises
+    `SessionError` if not even the first record is whole.
+    """
+    from seamlog.mcap.scan import scan
+
+    index = FileIndex()
+    try:
+        start = _summary_start(source)
+    except Malformed as error:
+        return scan(source, f"{source.path} is not finished ({error})", limits)
+    if start == 0:
+        return scan(source, "", limits)
+    try:
+        _read_summary(source, start, index, limits)
+    except Malformed as error:
+        reason = f"{source.path}: the summary at byte {start} is damaged ({error})"
+        return scan(source, reason, limits)
+    if index.statistics.message_count and not index.chunks:
+        return scan(source, "", limits)
+    index.profile, index.library = read_header(source)
+    return index
+
+
+def read_header(source: FileSource) -> tuple[str, str]:
+    """Profile and library of a file; `SessionError` if it is cut inside its first record."""
+    at = len(records.MAGIC)
+    try:
+        for opcode, offset, length in walk(source.data, at, source.size):
+            if opcode != records.HEADER:
+                break
+            return records.parse_header(source.content(offset, length, opcode))
+        raise Malformed("no header record")
+    except Malformed as error:
+        raise SessionError(
+            f"{source.path}: damaged or cut at byte {at}, before its first chunk ({error}); "
+            "there is nothing to read"
+        ) from error
+
+
+def walk(data: memoryview, start: int, end: int) -> Iterator[tuple[int, int, int]]:
+    """Opcode, offset and whole length of each record; `Malformed` at one that is not whole."""
+    at, head = start, records.RECORD_HEAD
+    while at < end:
+        if at + head.size > end:
+            raise Malformed(f"{end - at} bytes at byte {at} are no whole record")
+        opcode, length = head.unpack_from(data, at)
+        if opcode == 0 or length > end - at - head.size:
+            raise Malformed(f"the record at byte {at} is not whole")
+        yield opcode, at, length + head.size
+        at += length + head.size
+
+
+def _summary_start(source: FileSource) -> int:
+    data, end = source.data, source.size - len(records.MAGIC)
+    if source.size < 2 * len(records.MAGIC) + records.FOOTER_BYTES:
+        raise Malformed("it ends before a footer could be there")
+    if data[end:] != records.MAGIC:
+        raise Malformed("it does not end with the magic bytes of MCAP")
+    foot = source.content(end - records.FOOTER_BYTES, records.FOOTER_BYTES, records.FOOTER)
+    start = records.Cursor(foot).u64()
+    if start and not len(records.MAGIC) <= start <= end - records.FOOTER_BYTES:
+        raise Malformed(f"its footer points outside the file, at byte {start}")
+    return start
+
+
+def _read_summary(source: FileSource, start: int, index: FileIndex, limits: Limits) -> None:
+    end = source.size - records.END_BYTES
+    if end - start > limits.summary_bytes:
+        raise Malformed(f"{end - start} bytes are more than summary_bytes = {limits.summary_bytes}")
+    data = source.data
+    stored = records.Cursor(data, source.size - len(records.MAGIC) - 4).u32()
+    if stored and zlib.crc32(data[start : source.size - len(records.MAGIC) - 4]) != stored:
+        raise Malformed("its CRC is wrong")
+    for opcode, offset, length in walk(data, start, end):
+        index.learn(opcode, data[offset + records.RECORD_HEAD.size : offset + length])
+    _check_entries(source, index.chunks)
+
+
+def _check_entries(source: FileSource, chunks: list[ChunkEntry]) -> None:
+    reached = len(records.MAGIC)
+    for entry in sorted(chunks, key=lambda entry: entry.offset):
+        if entry.offset < reached or entry.offset + entry.length > source.size:
+            raise Malformed(f"the chunk at byte {entry.offset} overlaps another or leaves the file")
+        reached = entry.offset + entry.length

@@ -1,0 +1,46 @@
+"""One MCAP file opened for reading: mapped into memory, so that opening reads nothing."""
+
+import mmap
+from pathlib import Path
+
+from seamlog.errors import SessionError
+from seamlog.mcap.records import MAGIC, RECORD_HEAD, Malformed
+
+
+class FileSource:
+    """The bytes of a file; raises `SessionError` if it cannot be MCAP."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with path.open("rb") as file:
+            self.size = file.seek(0, 2)
+            if not self.size:
+                raise SessionError(
+                    f"{path} is empty: nothing was recorded into it, or the copy failed; "
+                    "fetch it again"
+                )
+            self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        self.data = memoryview(self._map)
+        if self.data[: len(MAGIC)] != MAGIC:
+            self.close()
+            raise SessionError(
+                f"{path} is no MCAP file (byte 0 does not begin with its magic); "
+                "'seamlog import' reads other formats"
+            )
+
+    def content(self, offset: int, length: int, opcode: int) -> memoryview:
+        """Content of the record of `length` bytes at `offset`; `Malformed` if it is another."""
+        if offset < len(MAGIC) or length < RECORD_HEAD.size or offset + length > self.size:
+            raise Malformed(f"a record of {length} bytes is not inside the file")
+        found = RECORD_HEAD.unpack_from(self.data, offset)
+        if found != (opcode, length - RECORD_HEAD.size):
+            raise Malformed(f"no record of kind {opcode} and {length} bytes is there")
+        return self.data[offset + RECORD_HEAD.size : offset + length]
+
+    def close(self) -> None:
+        """Unmap the file; views that are still held keep it until they go."""
+        try:
+            self.data.release()
+            self._map.close()
+        except BufferError:
+            pass

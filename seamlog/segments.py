@@ -1,0 +1,87 @@
+"""The files of one session: `weld.mcap`, `weld.0002.mcap` and so on, one recording id in all."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from seamlog.errors import SessionError
+from seamlog.limits import Limits
+from seamlog.mcap.file import McapFile
+
+RECORDING = "seamlog.recording"
+"""Metadata record of every session file: `id` of the recording, `index` of the file from 1."""
+_SEGMENT = re.compile(r"(?P<stem>.+?)(?:\.\d{4,})?\.mcap")
+
+
+def find_segments(path: str | Path | Sequence[str | Path], limits: Limits) -> list[McapFile]:
+    """Open all files of the session that `path` names, in their order."""
+    if not isinstance(path, str | Path):
+        return _ordered([McapFile(Path(item), limits) for item in path], "the list")
+    path = Path(path)
+    if path.is_dir():
+        inside = sorted(path.glob("*.mcap"))
+        if not inside:
+            raise SessionError(f"{path} is a folder without an .mcap file; name a session file")
+        return _ordered([McapFile(item, limits) for item in inside], str(path))
+    first = McapFile(path, limits)
+    if _identity(first)[0] is None:
+        return [first]
+    others = [other for item in _siblings(path) if (other := _opened(item, first, limits))]
+    return _ordered([first, *_of_recording(first, others)], str(path))
+
+
+def _siblings(path: Path) -> list[Path]:
+    match = _SEGMENT.fullmatch(path.name)
+    if match is None:
+        return []
+    found = (item for item in path.parent.iterdir() if item != path)
+    return [
+        item
+        for item in sorted(found)
+        if (other := _SEGMENT.fullmatch(item.name)) and other["stem"] == match["stem"]
+    ]
+
+
+def _opened(path: Path, first: McapFile, limits: Limits) -> McapFile | None:
+    try:
+        return McapFile(path, limits)
+    except SessionError as error:
+        first.note(f"{path} beside {first.path} cannot be read: {error}")
+        return None
+
+
+def _of_recording(first: McapFile, others: list[McapFile]) -> list[McapFile]:
+    wanted = _identity(first)[0]
+    kept = []
+    for other in others:
+        if _identity(other)[0] == wanted:
+            kept.append(other)
+        else:
+            other.close()
+    return kept
+
+
+def _identity(file: McapFile) -> tuple[str | None, int]:
+    for name, values in file.metadata():
+        if name == RECORDING:
+            index = values.get("index", "1")
+            return values.get("id"), int(index) if index.isdigit() else 1
+    return None, 1
+
+
+def _ordered(files: list[McapFile], where: str) -> list[McapFile]:
+    named = [(*_identity(file), file) for file in files]
+    if len(files) > 1 and len({identity for identity, _, _ in named}) > 1:
+        names = ", ".join(file.path.name for file in files)
+        for file in files:
+            file.close()
+        raise SessionError(f"{where} holds files of different recordings ({names}); open one")
+    named.sort(key=lambda row: row[1])
+    ordered = [file for _, _, file in named]
+    present = [index for _, index, _ in named]
+    missing = sorted(set(range(1, max(present, default=0) + 1)) - set(present))
+    if missing:
+        ordered[0].note(
+            f"{where}: file {', '.join(map(str, missing))} of the recording is not there"
+        )
+    return ordered
