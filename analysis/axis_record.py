@@ -101,13 +101,13 @@ def load_axis_record(session: "Session") -> AxisRecord:
     """
     command = session.columns(COMMAND)
     encoder = session.columns(ENCODER)
-    reference = session.columns(REFERENCE) if REFERENCE in session.info.topics else None
+    reference = session.columns(REFERENCE) if REFERENCE in session.info.channels else None
     times = command["log_time_ns"]
     newest = np.searchsorted(encoder["log_time_ns"], times, side="right") - 1
     known = newest >= 0
     if int(known.sum()) < 3:
         raise EvidenceError(
-            f"{session.info.path}: {len(times)} commands and {len(encoder['log_time_ns'])} encoder "
+            f"{session.path}: {len(times)} commands and {len(encoder['log_time_ns'])} encoder "
             "messages make fewer than three control periods; record for longer"
         )
     newest, times = newest[known], times[known]
@@ -123,7 +123,7 @@ def load_axis_record(session: "Session") -> AxisRecord:
         reference_m_s2=asked["acceleration_m_s2"],
         command=command["command"][known],
         saturated=command["saturated"][known].astype(bool),
-        drive=parse_drive(session.channel_metadata(COMMAND), str(session.info.path)),
+        drive=parse_drive(session.channel_metadata(COMMAND), str(session.path)),
         period_s=_period_s(stamp_ns),
     )
 

@@ -18,7 +18,8 @@ from seamlog.errors import EvidenceError
 from .axis_record import ENCODER, FloatArray
 
 if TYPE_CHECKING:
-    from seamlog.session import Session, Weld
+    from seamlog.session import Session
+    from seamlog.welds import Weld
 
 MARKER = "/robot/marker"
 CALIBRATION = "calibration/table_from_camera.json"
@@ -59,9 +60,9 @@ def torch_path(session: "Session", weld: "Weld") -> TorchPath:
     Raises `EvidenceError` where the session holds no marker or no calibration of the camera.
     """
     calibration = _calibration(session)
-    if MARKER not in session.info.topics:
+    if MARKER not in session.info.channels:
         raise EvidenceError(
-            f"{session.info.path} has no {MARKER}: where the torch was along the seam is not "
+            f"{session.path} has no {MARKER}: where the torch was along the seam is not "
             "known; record the marker that the camera finds on the torch"
         )
     start_ns, end_ns = weld.start_ns, weld.end_ns
@@ -165,13 +166,13 @@ def _spread(residual: FloatArray) -> float:
 def _calibration(session: "Session") -> PlaneCalibration:
     if CALIBRATION not in session.attachments:
         raise EvidenceError(
-            f"{session.info.path} has no attachment {CALIBRATION}: the marker is known in pixels "
+            f"{session.path} has no attachment {CALIBRATION}: the marker is known in pixels "
             "only; attach the camera's plane calibration with 'seamlog attach'"
         )
     data = session.attachments[CALIBRATION].data
-    found = parse_calibration(data, f"{session.info.path}: {CALIBRATION}")
+    found = parse_calibration(data, f"{session.path}: {CALIBRATION}")
     if not isinstance(found, PlaneCalibration):
-        raise EvidenceError(f"{session.info.path}: {CALIBRATION} is a scale, a plane is needed")
+        raise EvidenceError(f"{session.path}: {CALIBRATION} is a scale, a plane is needed")
     return found
 
 

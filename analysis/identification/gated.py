@@ -20,7 +20,8 @@ from .filtering import FloatArray
 from .method import Friction, Identification, Motion, friction_columns, names_of
 from .regression import Fit, correlated_least_squares
 
-DELAYS = range(4)
+USUAL_DELAY = 1
+"""Periods between a command and its effect in a sampled loop that computes while it waits."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +50,13 @@ class _Windows:
 def identify_gated(
     record: AxisRecord,
     friction: Friction = "symmetric",
-    delay_periods: int | None = None,
+    delay_periods: int = USUAL_DELAY,
     settings: GatedSettings | None = None,
 ) -> Identification:
     """Identify from logged position, speed and command.
 
-    `delay_periods` None: the delay of 0 to 3 periods that leaves the smallest residual.
+    The delay between a command and its effect must be known: residuals of a disturbed axis hardly
+    tell one period from the next.
     """
     settings = settings or GatedSettings()
     if not record.has_velocity:
@@ -72,17 +74,14 @@ def identify_gated(
             "record a run that moves to and fro, such as 100 sin(t) mm for 20 s"
         )
     require_both_directions(motion)
-    delays = DELAYS if delay_periods is None else (delay_periods,)
-    fits = {delay: _fit(record, windows, friction, delay, settings) for delay in delays}
-    delay = min(fits, key=lambda key: fits[key].relative_error)
     return Identification(
         method="gated",
         friction=friction,
-        fit=fits[delay],
+        fit=_fit(record, windows, friction, delay_periods, settings),
         motion=motion,
         stamp_ns=record.stamp_ns[1 + settings.settle :],
         unit=record.drive.result_unit,
-        delay_periods=delay,
+        delay_periods=delay_periods,
         settings={"gate_m_s": settings.gate_m_s, "filter_rate_1_s": settings.filter_rate_1_s},
     )
 

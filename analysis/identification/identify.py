@@ -4,7 +4,7 @@ from typing import Literal
 
 from seamlog.analysis.axis_record import AxisRecord
 
-from .gated import identify_gated
+from .gated import USUAL_DELAY, identify_gated
 from .idim_ls import MINIMUM_RATE_HZ, identify_idim_ls
 from .method import Friction, Identification
 
@@ -15,7 +15,7 @@ def identify_axis(
     record: AxisRecord,
     method: Method = "auto",
     friction: Friction = "symmetric",
-    delay_periods: int | None = None,
+    delay_periods: int = USUAL_DELAY,
 ) -> tuple[Identification, str]:
     """Identify the axis; also returns why this method was taken.
 

@@ -107,5 +107,6 @@ def _solve(
             f"this motion cannot tell {' and '.join(mixed)} apart (condition number "
             f"above {SINGULAR_CONDITION:g}); record a run whose speed and acceleration both vary"
         )
-    values = np.linalg.lstsq(regressor, measured, rcond=None)[0]
-    return values, np.linalg.inv(regressor.T @ regressor)
+    values = np.asarray(np.linalg.lstsq(regressor, measured, rcond=None)[0], dtype=np.float64)
+    inverse = np.asarray(np.linalg.inv(regressor.T @ regressor), dtype=np.float64)
+    return values, inverse

@@ -1,1 +1,1 @@
-"""Logged inputs through controllers and estimators again: shadow and counterfactual."""
+"""Replay: logged inputs through controllers and estimators again, shadow and counterfactual."""

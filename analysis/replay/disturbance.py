@@ -1,0 +1,69 @@
+"""What acted on the axis beside the model: the slow part of what the model cannot explain.
+
+Where the axis slides the sampled equation of motion gives it directly, period by period; it is
+interpolated where the axis stands or turns, and passed through a zero-phase low pass, because its
+fast part is measurement noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from seamlog.analysis.axis_record import AxisRecord, FloatArray
+from seamlog.contracts import Axis
+
+from .shadow import applied_commands
+
+CUTOFF_HZ = 1.0
+GATE_M_S = 0.005
+_BLOCK_S = 1.0
+
+
+@dataclass(frozen=True)
+class Residual:
+    """`slow` is the disturbance taken as real, `fast` the rest; command unit, shape (n,)."""
+
+    slow: FloatArray
+    fast: FloatArray
+    period_s: float
+
+    def resampled(self, random: np.random.Generator) -> FloatArray:
+        """The slow part as it might have come out with other noise (block bootstrap)."""
+        count = len(self.fast)
+        block = max(1, round(_BLOCK_S / self.period_s))
+        starts = random.integers(0, max(1, count - block), size=-(-count // block))
+        rows = (starts[:, None] + np.arange(block)).ravel()[:count]
+        return self.slow + low_pass(self.fast[np.minimum(rows, count - 1)], self.period_s)
+
+
+def residual_disturbance(record: AxisRecord, axis: Axis) -> Residual:
+    """Residual of `record` against the model of `axis`, positive where it opposes the command."""
+    period_s = record.period_s
+    applied = applied_commands(record.command, axis.delay_periods)[:-1]
+    speed = record.velocity_m_s
+    model = (
+        axis.inertia * np.diff(speed) / period_s
+        + axis.viscous_friction * np.diff(record.position_m) / period_s
+        + axis.coulomb_friction * np.sign(speed[1:])
+        + axis.offset
+    )
+    sliding = speed[1:] * speed[:-1] > 0
+    sliding &= np.minimum(np.abs(speed[1:]), np.abs(speed[:-1])) > GATE_M_S
+    rows = np.flatnonzero(sliding)
+    if not len(rows):
+        nothing = np.zeros(len(record))
+        return Residual(nothing, nothing, period_s)
+    raw = np.interp(np.arange(len(record)), rows, (applied - model)[rows])
+    slow = low_pass(raw, period_s)
+    return Residual(slow, raw - slow, period_s)
+
+
+def low_pass(values: FloatArray, period_s: float) -> FloatArray:
+    """Second-order Butterworth at CUTOFF_HZ, zero phase; values at too low a rate stay."""
+    cutoff = 2 * CUTOFF_HZ * period_s
+    if cutoff >= 1:
+        return values
+    b, a = signal.butter(2, cutoff)
+    padding = min(3 * max(len(a), len(b)), len(values) - 1)
+    return np.asarray(signal.filtfilt(b, a, values, padlen=padding), dtype=np.float64)

@@ -1,0 +1,58 @@
+"""The identified axis as a plant: in the command's unit, with the covariance of its parameters."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seamlog.analysis.axis_record import AxisRecord, FloatArray
+from seamlog.analysis.identification.gated import USUAL_DELAY
+from seamlog.analysis.identification.identify import identify_axis
+from seamlog.contracts import Axis
+from seamlog.errors import EvidenceError
+
+from .live import LiveController
+
+_NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
+_LEAST_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class AxisModel:
+    """`covariance` (4, 4) is of inertia, viscous friction, Coulomb friction and offset."""
+
+    axis: Axis
+    covariance: FloatArray
+    method: str
+
+    def drawn(self, random: np.random.Generator) -> Axis:
+        """One axis from the parameters' distribution; nothing physical falls below 0."""
+        mean = np.array([getattr(self.axis, name) for name in _NAMES])
+        values = random.multivariate_normal(mean, self.covariance, method="svd")
+        values[:3] = np.maximum(values[:3], _LEAST_SHARE * mean[:3])
+        return replace(self.axis, **dict(zip(_NAMES, values.tolist(), strict=True)))
+
+
+def identify_model(record: AxisRecord, live: LiveController | None) -> AxisModel:
+    """Identify `record` and take delay and saturation from the live loop where it told them."""
+    delay = live.axis.delay_periods if live else USUAL_DELAY
+    found, _ = identify_axis(record, delay_periods=delay)
+    scale = record.drive.scale
+    values = found.fit.values / scale
+    bad = [name for name, value in zip(_NAMES[:3], values, strict=False) if value <= 0]
+    if bad:
+        raise EvidenceError(
+            f"identification gave {', '.join(bad)} at or below 0, which no axis has: there is no "
+            "model to replay on; run 'seamlog identify' for what the record lacks"
+        )
+    axis = Axis(
+        **dict(zip(_NAMES, values.tolist(), strict=True)),
+        saturation=live.axis.saturation if live else _seen_saturation(record),
+        delay_periods=found.delay_periods,
+        unit=record.drive.unit or "command unit",
+    )
+    return AxisModel(axis, found.fit.covariance / scale**2, found.method)
+
+
+def _seen_saturation(record: AxisRecord) -> float:
+    limited = np.abs(record.command[record.saturated])
+    return float(limited.max()) if len(limited) else float("inf")

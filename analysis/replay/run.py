@@ -1,0 +1,170 @@
+"""One replay of a session: several controllers and estimators, shadow and counterfactual."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from seamlog.analysis.axis_record import AxisRecord
+from seamlog.analysis.identification.gated import USUAL_DELAY
+from seamlog.contracts import Axis
+from seamlog.errors import EvidenceError
+from seamlog.progress import track
+
+from .counterfactual import Prediction, make_scene, predict
+from .factories import ControllerChoice, EstimatorChoice, choose_controller, choose_estimator
+from .inputs import ReplayInputs
+from .live import LiveController
+from .model import AxisModel, identify_model
+from .self_check import SelfCheck, check_replay, recorded_choice
+from .settings import Mode, ReplaySettings
+from .shadow import EstimatorTrace, ShadowOutput, shadow_controller, shadow_estimator
+
+
+@dataclass(frozen=True)
+class ControllerRun:
+    """What a controller said (shadow) and would have done (prediction)."""
+
+    choice: ControllerChoice
+    state_names: tuple[str, ...]
+    shadow: ShadowOutput | None
+    prediction: Prediction | None
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EstimatorRun:
+    """What an estimator makes of the record."""
+
+    choice: EstimatorChoice
+    trace: EstimatorTrace
+
+
+@dataclass(frozen=True)
+class Replay:
+    """All that came out; `model` None with `model_reason` where no axis could be identified.
+
+    `recorded` is the prediction of the recorded controller itself, to be held against the record.
+    """
+
+    inputs: ReplayInputs
+    live: LiveController | None
+    model: AxisModel | None
+    model_reason: str
+    self_check: SelfCheck
+    recorded: Prediction | None
+    controllers: tuple[ControllerRun, ...]
+    estimators: tuple[EstimatorRun, ...]
+
+    @property
+    def record(self) -> AxisRecord:
+        """The loop that was replayed."""
+        return self.inputs.record
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """What all runs of one replay have in common."""
+
+    record: AxisRecord
+    model: AxisModel | None
+    live: LiveController | None
+    mode: Mode
+    settings: ReplaySettings
+
+    def axis_for(self, choice: ControllerChoice) -> Axis:
+        """The recorded controller keeps its nominal axis, others get the identified one."""
+        if self.live and self._is_recorded(choice):
+            return self.live.axis
+        if self.model:
+            return self.model.axis
+        if self.live:
+            return self.live.axis
+        raise EvidenceError(
+            "no axis is known: the session names none and none could be identified, so a "
+            "controller cannot be made; record a run that moves to and fro"
+        )
+
+    def _is_recorded(self, choice: ControllerChoice) -> bool:
+        return self.live is not None and choice.name == self.live.name
+
+    def prediction(self, choice: ControllerChoice) -> Prediction | None:
+        if self.model is None or self.mode == "shadow":
+            return None
+        axis, period_s = self.axis_for(choice), self.record.period_s
+        scene = make_scene(self.record, self.model)
+        settings = self.settings
+        return predict(lambda: choice.make(axis, period_s), scene, settings.members, settings.seed)
+
+    def shadow(self, choice: ControllerChoice) -> ShadowOutput | None:
+        if self.mode == "counterfactual":
+            return None
+        axis = self.axis_for(choice)
+        controller = choice.make(axis, self.record.period_s)
+        return shadow_controller(controller, self.record, axis.saturation)
+
+
+def replay(
+    inputs: ReplayInputs,
+    live: LiveController | None,
+    controllers: Sequence[str],
+    estimators: Sequence[str],
+    mode: Mode,
+    settings: ReplaySettings,
+) -> Replay:
+    """Replay `inputs` through the named controllers and estimators.
+
+    Where no axis can be identified the counterfactual is left out with the reason, or refused
+    (`EvidenceError`) if it was all that was asked for.
+    """
+    choices = [_controller(name, live, settings) for name in controllers]
+    watchers = [choose_estimator(name, settings.estimators.get(name, {})) for name in estimators]
+    model, reason = _model(inputs.record, live, mode)
+    stage = _Stage(inputs.record, model, live, mode, settings)
+    own, _ = recorded_choice(live)
+    delay = model.axis.delay_periods if model else live.axis.delay_periods if live else USUAL_DELAY
+    return Replay(
+        inputs=inputs,
+        live=live,
+        model=model,
+        model_reason=reason,
+        self_check=check_replay(inputs.record, live, model.axis if model else None),
+        recorded=stage.prediction(own) if own else None,
+        controllers=tuple(_run(choice, stage) for choice in track(choices, "controllers")),
+        estimators=tuple(
+            EstimatorRun(
+                choice, shadow_estimator(choice.make(inputs.record.period_s), inputs.record, delay)
+            )
+            for choice in watchers
+        ),
+    )
+
+
+def _controller(
+    name: str, live: LiveController | None, settings: ReplaySettings
+) -> ControllerChoice:
+    values = settings.controllers.get(name)
+    if values is None:
+        values = live.config if live and live.name == name else {}
+    return choose_controller(name, values)
+
+
+def _model(
+    record: AxisRecord, live: LiveController | None, mode: Mode
+) -> tuple[AxisModel | None, str]:
+    try:
+        return identify_model(record, live), ""
+    except EvidenceError as error:
+        if mode == "counterfactual":
+            raise
+        return None, str(error)
+
+
+def _run(choice: ControllerChoice, stage: _Stage) -> ControllerRun:
+    controller = choice.make(stage.axis_for(choice), stage.record.period_s)
+    warnings = controller.warnings() if hasattr(controller, "warnings") else []
+    return ControllerRun(
+        choice=choice,
+        state_names=tuple(controller.state_names),
+        shadow=stage.shadow(choice),
+        prediction=stage.prediction(choice),
+        warnings=tuple(warnings),
+    )
