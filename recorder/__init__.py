@@ -1,1 +1,25 @@
 """The live side: control loop to ring to session file, recovery, sources and importers."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .accounts import Account, Status
+    from .channel import Channel
+    from .recorder import Recorder
+
+__all__ = ["Account", "Channel", "Recorder", "Status"]
+_HOMES = {
+    "Account": "accounts",
+    "Channel": "channel",
+    "Recorder": "recorder",
+    "Status": "accounts",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load the recorder when it is first asked for, so that its commands import little."""
+    if name in _HOMES:
+        from importlib import import_module
+
+        return getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,110 @@
+"""The accounts of a recording: what was offered, what became of it, per channel.
+
+offered = accepted + dropped + refused, and accepted = written + lost + waiting, where waiting
+are those in the ring or in a chunk that is not written yet.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+from .ring import (
+    DROPPED,
+    FIRST_DROPPED,
+    HIGH_WATER_PPM,
+    LAST_DROPPED,
+    LAST_SYNC_NS,
+    LOST,
+    REFUSED,
+    REFUSED_FOREIGN,
+    WRITTEN,
+    Ring,
+)
+
+ACKNOWLEDGEMENT = (
+    ("accepted", "put returned True: survives the death of the live loop"),
+    ("flushed", "handed to the system, within 0.1 s: survives the death of the recorder too"),
+    ("durable", "synced, within 0.35 s, at once on arc off and faults: survives loss of power"),
+)
+"""What each level of acknowledgement survives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """Counts of one channel; sequences are -1 where nothing was dropped."""
+
+    topic: str
+    producer: str
+    accepted: int
+    dropped: int
+    refused: int
+    written: int
+    lost: int
+    first_dropped_sequence: int
+    last_dropped_sequence: int
+    ring_high_water: float
+    """Largest filled fraction of the ring."""
+    last_sync_ns: int
+    """Log time of the last sync to disk, 0 if there was none."""
+    reason: str
+    """Why the first message was turned away; empty if none was."""
+    longest_gap_s: float | None = None
+    """Longest time between two messages in a row; None with fewer than two, or while running."""
+
+    @property
+    def offered(self) -> int:
+        """Messages that the loop wanted to log."""
+        return self.accepted + self.dropped + self.refused
+
+    @property
+    def waiting(self) -> int:
+        """Accepted messages on their way to the file."""
+        return self.accepted - self.written - self.lost
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """A recording at one time; `findings` are in words, empty if all is well."""
+
+    recording_id: str
+    path: str
+    is_recording: bool
+    """The recorder process lives and takes messages."""
+    channels: tuple[Account, ...]
+    findings: tuple[str, ...]
+
+    @property
+    def is_complete(self) -> bool:
+        """Nothing was dropped, refused or lost, and nothing else went wrong."""
+        counts = (row.dropped + row.refused + row.lost for row in self.channels)
+        return not self.findings and not any(counts)
+
+
+def ring_account(topic: str, producer: str, ring: Ring, accepted: int) -> Account:
+    """The account of a ring as its header tells it."""
+    words = ring.words
+    return Account(
+        topic,
+        producer,
+        accepted,
+        int(words[DROPPED]),
+        int(words[REFUSED] + words[REFUSED_FOREIGN]),
+        int(words[WRITTEN]),
+        int(words[LOST]),
+        int(words[FIRST_DROPPED]) - 1,
+        int(words[LAST_DROPPED]) - 1,
+        words[HIGH_WATER_PPM] / 1e6,
+        int(words[LAST_SYNC_NS]),
+        ring.reason,
+    )
+
+
+def account_document(account: Account) -> dict[str, Any]:
+    """`account` as JSON-ready values, with what follows from them."""
+    derived = {"offered": account.offered, "waiting": account.waiting}
+    return asdict(account) | derived
+
+
+def read_account(document: Mapping[str, Any]) -> Account:
+    """What `account_document` wrote."""
+    return Account(**{field.name: document[field.name] for field in fields(Account)})

@@ -1,0 +1,159 @@
+"""The folder of a recording in shared memory: rings, and what else the loop hands over.
+
+    /dev/shm/seamlog-<uid>/<recording id>/
+        recording.json          what is recorded, where to, by whom
+        lock                    locked while the loop or the recorder process lives
+        000001.json             an item: a channel, an attachment or a metadata record
+        000001.ring, .data      what belongs to it
+
+Items are numbered and appear by rename, so they are whole, in order, and outlive the loop.
+"""
+
+import fcntl
+import json
+import os
+import shutil
+import stat
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from seamlog.contracts import Pace
+from seamlog.errors import HardwareError
+
+RECORDING_RECORD = "seamlog.recording"
+"""Name of the metadata record that says what was recorded."""
+RESERVED = ("id", "index", "start_ns", "pace", "ring_path", "producer")
+"""Keys of that record which are not the user's."""
+_SETTLED_S = 60.0
+"""A folder younger than this may be about to be locked by its owner."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What the recorder process must know; `anchor_ns` turns monotonic time into log time.
+
+    Without an anchor the clock is not ours to read: log time is then that of the newest message.
+    """
+
+    id: str
+    path: str
+    start_ns: int
+    pace: Pace
+    anchor_ns: int | None
+    force: bool
+    pid: int
+    meta: Mapping[str, str]
+
+    @property
+    def partial(self) -> Path:
+        """Name of the session file until it is finished."""
+        return Path(self.path + ".part")
+
+
+def root() -> Path:
+    """The folder of all recordings of this user, made if needed; `HardwareError` if impossible."""
+    if not sys.platform.startswith("linux"):
+        raise HardwareError(
+            "recording needs the shared memory of Linux; record on a Linux machine and bring "
+            "the session here"
+        )
+    folder = Path("/dev/shm") / f"seamlog-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    facts = folder.lstat()
+    if facts.st_uid != os.getuid() or not stat.S_ISDIR(facts.st_mode):
+        raise HardwareError(f"{folder} belongs to another user; have it removed")
+    return folder
+
+
+def make_folder(recording: Recording) -> tuple[Path, int]:
+    """Make and lock the folder of a recording; returns it and the descriptor of its lock."""
+    folder = root() / recording.id
+    folder.mkdir(mode=0o700)
+    lock = os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    _place(folder / "recording.json", json.dumps(asdict(recording)).encode())
+    return folder, lock
+
+
+def read_recording(folder: Path) -> Recording:
+    """What `make_folder` wrote."""
+    return Recording(**json.loads((folder / "recording.json").read_bytes()))
+
+
+def abandoned_folders() -> list[Path]:
+    """Folders of recordings whose processes are all dead.
+
+    Those whose unfinished session file is gone as well hold nothing anyone could still use and
+    are removed; the others are returned.
+    """
+    kept = []
+    for folder in root().iterdir():
+        if not _is_abandoned(folder):
+            continue
+        try:
+            wanted = read_recording(folder).partial.exists()
+        except (OSError, ValueError, TypeError):
+            wanted = False
+        if wanted:
+            kept.append(folder)
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+    return kept
+
+
+def _is_abandoned(folder: Path) -> bool:
+    try:
+        if time.time() - folder.stat().st_mtime < _SETTLED_S:
+            return False
+        lock = os.open(folder / "lock", os.O_RDWR | os.O_CLOEXEC)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    finally:
+        os.close(lock)
+    return True
+
+
+def _place(path: Path, data: bytes) -> None:
+    partial = path.with_suffix(".new")
+    partial.write_bytes(data)
+    partial.rename(path)
+
+
+class OutTray:
+    """Where the loop puts items; any thread may."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.lock = threading.RLock()
+        self._next = 1
+
+    def next_path(self, suffix: str) -> Path:
+        """Path for what belongs to the next item; hold `lock` until it is placed."""
+        return self.folder / f"{self._next:06d}{suffix}"
+
+    def place(self, item: Mapping[str, Any]) -> None:
+        """Hand over `item`."""
+        with self.lock:
+            _place(self.next_path(".json"), json.dumps(item).encode())
+            self._next += 1
+
+
+def iter_items(folder: Path, first: int) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Items from number `first` on, as far as they are there."""
+    number = first
+    while True:
+        try:
+            item = json.loads((folder / f"{number:06d}.json").read_bytes())
+        except FileNotFoundError:
+            return
+        yield number, item
+        number += 1

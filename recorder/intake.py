@@ -1,0 +1,60 @@
+"""The recorder process' end of the tray: items of the loop become channels and records."""
+
+from pathlib import Path
+from typing import Any
+
+from seamlog.channels import ARC_OFF, CHANNELS, EMERGENCY_STOP, FAULT, IMAGE_SCHEMA
+from seamlog.messages import CDR_HEADER
+
+from .feeds import Feed, FixedFeed
+from .folder import iter_items
+from .mcap_writer import SessionFile
+from .pictures import picture_encoder
+from .ring import RECORD, open_ring
+from .varying_feed import VaryingFeed
+
+_KIND_AT = RECORD.size + len(CDR_HEADER) + 8
+"""Offset of `kind` in a message record of `/events`: behind the payload's stamp."""
+_URGENT = frozenset((ARC_OFF, FAULT, EMERGENCY_STOP))
+
+
+class Intake:
+    """Takes items in the order of their numbers, each once."""
+
+    def __init__(self, folder: Path, file: SessionFile) -> None:
+        self._folder = folder
+        self._file = file
+        self._next = 1
+        self.feeds: list[Feed] = []
+
+    def take(self) -> None:
+        """Take in what has arrived; after an `OSError` the item stays and comes again."""
+        for number, item in iter_items(self._folder, self._next):
+            self._take(item)
+            self._next = number + 1
+
+    def _take(self, item: dict[str, Any]) -> None:
+        if item["kind"] == "channel":
+            self._add_channel(item)
+        elif item["kind"] == "metadata":
+            self._file.add_metadata(item["name"], item["values"])
+        else:
+            data = (self._folder / item["data"]).read_bytes()
+            self._file.attach(item["name"], data, item["media_type"], item["log_time_ns"])
+            (self._folder / item["data"]).unlink()
+
+    def _add_channel(self, item: dict[str, Any]) -> None:
+        topic, channel_id, metadata = item["topic"], item["channel_id"], item["metadata"]
+        ring = open_ring(self._folder / item["ring"])
+        self._file.add_channel(topic, channel_id, metadata)
+        place = (channel_id, topic, metadata["producer"], ring, self._file)
+        if ring.stride:
+            self.feeds.append(FixedFeed(*place))
+            return
+        is_picture = CHANNELS[topic].schema == IMAGE_SCHEMA
+        encode = picture_encoder(channel_id) if is_picture else None
+        self.feeds.append(VaryingFeed(*place, encode, _is_urgent if topic == "/events" else None))
+
+
+def _is_urgent(record: memoryview) -> bool:
+    return record[_KIND_AT] in _URGENT

@@ -1,0 +1,142 @@
+"""Starting, watching and ending the recorder process."""
+
+import fcntl
+import json
+import os
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import seamlog
+from seamlog.errors import OutputExists
+from seamlog.files import check_output
+
+from .folder import Recording
+
+_PATIENCE_S = 30.0
+"""`finish` gives up when the recorder process has moved nothing for so long."""
+
+
+def claim_partial(recording: Recording) -> int:
+    """Create and lock the `.part` file of a recording; returns its descriptor.
+
+    `OutputExists` if the session, or an unfinished one of that name, is there already; `force`
+    replaces both, but never one that is being recorded.
+    """
+    check_output(Path(recording.path), recording.force)
+    partial = recording.partial
+    if partial.exists():
+        _refuse_living(partial)
+        if not recording.force:
+            raise OutputExists(
+                f"{partial} is there already, from a recording that was not finished; move it "
+                "away, or give --force to replace it"
+            )
+        partial.unlink()
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    try:
+        descriptor = os.open(partial, flags, 0o644)
+    except FileExistsError:
+        raise OutputExists(f"{partial} is being recorded by another process") from None
+    fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return descriptor
+
+
+def _refuse_living(partial: Path) -> None:
+    with partial.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            message = f"{partial} is being recorded by another process"
+            raise OutputExists(message) from None
+
+
+class WritingProcess:
+    """The recorder process as the loop sees it.
+
+    It is told of the loop's end by the end of a pipe and by a descriptor of the loop's process,
+    which also works when a forked child of the loop keeps the pipe open.
+    """
+
+    def __init__(self, folder: Path, partial: int, lock: int) -> None:
+        self._folder = folder
+        inner, self._pipe = os.pipe()
+        own = _own_process()
+        passed = [number for number in (partial, lock, inner, own) if number >= 0]
+        script = "seamlog.recorder.process"
+        command = [sys.executable, "-P", "-m", script, str(folder), str(partial), str(inner)]
+        with (folder / "errors.txt").open("wb") as errors:
+            self._process = subprocess.Popen(
+                [*command, str(own)],
+                pass_fds=passed,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                start_new_session=True,
+                env=_environment(),
+            )
+        for number in passed:
+            os.close(number)
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    def is_alive(self) -> bool:
+        """True while the recorder process runs."""
+        return self._process.poll() is None
+
+    def leave(self) -> None:
+        """Close the pipe in a forked child, which has no part in the recording."""
+        with suppress(OSError):
+            os.close(self._pipe)
+
+    def finish(self, progress: Path) -> dict[str, Any] | None:
+        """Tell the process to end and wait while it moves; its accounts, None if it was lost.
+
+        `progress` is a file whose growth shows that it works.
+        """
+        with suppress(BrokenPipeError):
+            os.write(self._pipe, b"C")
+        self.leave()
+        output = self._wait(progress)
+        try:
+            found = json.loads(output)
+        except ValueError:
+            return None
+        return found if isinstance(found, dict) else None
+
+    def _wait(self, progress: Path) -> bytes:
+        seen, since = -1, time.monotonic()
+        while time.monotonic() - since < _PATIENCE_S:
+            with suppress(subprocess.TimeoutExpired):
+                return bytes(self._process.communicate(timeout=0.5)[0])
+            size = progress.stat().st_size if progress.exists() else seen
+            if size != seen:
+                seen, since = size, time.monotonic()
+        return b""
+
+    def last_words(self) -> str:
+        """What the process wrote to its error stream, the last line of it."""
+        with suppress(OSError):
+            lines = (self._folder / "errors.txt").read_text(errors="replace").split("\n")
+            return next((line for line in reversed(lines) if line.strip()), "")
+        return ""
+
+
+def _own_process() -> int:
+    try:
+        return os.pidfd_open(os.getpid())
+    except OSError:
+        return -1
+
+
+def _environment() -> dict[str, str]:
+    """This environment, with the folder of this very package on the module path."""
+    home = str(Path(seamlog.__file__).resolve().parent.parent)
+    paths = [home, os.environ.get("PYTHONPATH", "")]
+    return os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}

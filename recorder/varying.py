@@ -1,0 +1,164 @@
+"""Messages of varying length: built whole, then copied into their ring."""
+
+import struct
+from collections.abc import Callable
+from threading import get_ident
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seamlog.clock import Clock
+
+from .fixed import log_time_parts
+from .gate import Gate
+from .ring import (
+    ACCEPTED,
+    HEAD,
+    MESSAGE,
+    RAW_FRAME,
+    RECORD,
+    RECORD_HEAD_BYTES,
+    SKIP,
+    TAIL,
+    Ring,
+)
+
+Encode: TypeAlias = Callable[..., bytes]
+RAW_HEAD = struct.Struct("<BQIQQIIB")
+"""Opcode, length, sequence, log time, stamp, rows, columns, samples per pixel."""
+_STAMPS = 1 << 63
+_SEQUENCES = 1 << 32
+_LARGEST_PX = 65_500
+
+
+class VaryingWriter:
+    """Producer of a ring of whole records.
+
+    `share` is the part of the ring it may fill, half of it with one message (so that one fits
+    into an empty ring wherever that begins again).
+    """
+
+    def __init__(
+        self, ring: Ring, gate: Gate, channel_id: int, clock: Clock, encode: Encode, share: float
+    ) -> None:
+        self._ring = ring
+        self._gate = gate
+        self._channel_id = channel_id
+        self._now, self._anchor = log_time_parts(clock)
+        self._encode = encode
+        self._share = int(ring.capacity * share)
+        self._head = 0
+        self._accepted = 0
+        self._gaps = 0
+
+    def put(self, stamp_ns: int, *values: Any) -> bool:
+        """Log one message, values in the table's order."""
+        if get_ident() != self._gate.owner:
+            return self._gate.refuse_foreign()
+        try:
+            payload = self._encode(stamp_ns, *values)
+            head = self._message_head(stamp_ns, len(payload))
+        except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
+            return self._gate.refuse(f"{type(error).__name__}: {error}")
+        at = self._reserve(len(head) + len(payload))
+        if at is None:
+            return False
+        body = at + len(head)
+        self._ring.data[at:body] = head
+        self._ring.data[body : body + len(payload)] = payload
+        return self._publish(at, len(head) + len(payload))
+
+    def put_frame(self, stamp_ns: int, image: NDArray[Any]) -> bool:
+        """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""
+        if get_ident() != self._gate.owner:
+            return self._gate.refuse_foreign()
+        try:
+            head = self._raw_head(stamp_ns, image)
+        except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
+            return self._gate.refuse(f"{type(error).__name__}: {error}")
+        at = self._reserve(len(head) + image.size)
+        if at is None:
+            return False
+        body = at + len(head)
+        self._ring.data[at:body] = head
+        place = np.frombuffer(self._ring.data, np.uint8, image.size, body)
+        np.copyto(place.reshape(image.shape), image)
+        return self._publish(at, len(head) + image.size)
+
+    def stop(self) -> bool:
+        """Take nothing more."""
+        self._gate.is_open = False
+        return True
+
+    def _sequence(self) -> int:
+        return (self._accepted + self._gaps) % _SEQUENCES
+
+    def _message_head(self, stamp_ns: int, size: int) -> bytes:
+        _check_stamp(stamp_ns)
+        length = RECORD.size - RECORD_HEAD_BYTES + size
+        log_time_ns = self._now() + self._anchor
+        return RECORD.pack(
+            MESSAGE, length, self._channel_id, self._sequence(), log_time_ns, stamp_ns
+        )
+
+    def _raw_head(self, stamp_ns: int, image: NDArray[Any]) -> bytes:
+        _check_stamp(stamp_ns)
+        check_image(image)
+        length = RAW_HEAD.size - RECORD_HEAD_BYTES + image.size
+        log_time_ns = self._now() + self._anchor
+        rows, columns, *samples = image.shape
+        shape = (rows, columns, *(samples or (1,)))
+        return RAW_HEAD.pack(RAW_FRAME, length, self._sequence(), log_time_ns, stamp_ns, *shape)
+
+    def _reserve(self, size: int) -> int | None:
+        """Offset for a record of `size` bytes, or None if it was turned away."""
+        if size > self._share // 2:
+            self._gate.refuse(f"the message has {size} bytes, one may have {self._share // 2}")
+            return None
+        capacity = self._ring.capacity
+        rest = capacity - self._head % capacity
+        end = self._head + size + (rest if rest < size else 0)
+        if self._gate.is_open and self._gate.has_room(lambda: self._fits(end)):
+            return self._start(rest, size)
+        if not self._gate.is_open:
+            self._gate.refuse_closed()
+            return None
+        self._gaps += 1
+        self._gate.drop(self._accepted + self._gaps - 1)
+        return None
+
+    def _fits(self, end: int) -> bool:
+        return end - int(self._ring.words[TAIL]) <= self._share
+
+    def _start(self, rest: int, size: int) -> int:
+        at = self._head % self._ring.capacity
+        if rest >= size:
+            return at
+        self._ring.data[at] = SKIP
+        return 0
+
+    def _publish(self, at: int, size: int) -> bool:
+        capacity = self._ring.capacity
+        skipped = -self._head % capacity if at == 0 else 0
+        self._head += skipped + size
+        self._ring.words[HEAD] = self._head
+        self._accepted += 1
+        self._ring.words[ACCEPTED] = self._accepted
+        return True
+
+
+def _check_stamp(stamp_ns: int) -> None:
+    if not 0 <= stamp_ns.__index__() < _STAMPS:
+        raise ValueError(f"stamp_ns must be from 0 to 2**63 - 1, got {stamp_ns}")
+
+
+def check_image(image: NDArray[Any]) -> None:
+    """Refuse with `ValueError` what is no picture of the kind that can be recorded."""
+    form: tuple[int, ...] = getattr(image, "shape", ())
+    if getattr(image, "dtype", None) != np.uint8:
+        raise ValueError(f"a picture is a numpy array of uint8, got {type(image).__name__}")
+    if not (len(form) == 2 or (len(form) == 3 and form[2] == 3)) or 0 in form:
+        raise ValueError(f"a picture has shape (rows, columns) or (rows, columns, 3), got {form}")
+    if max(form) > _LARGEST_PX:
+        raise ValueError(f"a picture of {form[1]} x {form[0]} px is larger than JPEG allows")
