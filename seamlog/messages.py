@@ -115,12 +115,16 @@ def is_fixed(channel: Channel) -> bool:
     return bool(kinds) and all(base in PRIMITIVES and count != -1 for base, count in kinds)
 
 
-@cache
 def layout(topic: str) -> Layout:
     """Layout of a fixed-width topic of the table; `KeyError` for an unknown topic."""
-    channel = CHANNELS[topic]
+    return layout_of(CHANNELS[topic])
+
+
+@cache
+def layout_of(channel: Channel) -> Layout:
+    """Layout of the fixed-width messages of `channel`, which need not be in the table."""
     if not is_fixed(channel):
-        raise ValueError(f"{topic}: {channel.schema} has no fixed width")
+        raise ValueError(f"{channel.topic}: {channel.schema} has no fixed width")
     codes, offsets, at = "", [], 0
     for field in channel.fields:
         base, count = split_array(field.type)

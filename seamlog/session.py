@@ -68,6 +68,11 @@ class Session:
         rows = (row for file in self.files for row in file.index.channels.values())
         return sorted({row.topic for row in rows})
 
+    @property
+    def is_window(self) -> bool:
+        """True for a window of a session."""
+        return self.span != ENDLESS
+
     @cached_property
     def info(self) -> SessionInfo:
         """What there is: channels, welds, attachments, problems."""

@@ -9,7 +9,7 @@ import os
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
-from typing import IO
+from typing import IO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ from seamlog.mcap.records import (
     Schema,
     Statistics,
 )
+
+MessageIndex: TypeAlias = tuple[NDArray[np.uint64], NDArray[np.uint64]]
+"""Log times and offsets of messages."""
 
 
 class FileWriter:
@@ -79,6 +82,32 @@ class FileWriter:
         self._heads[number] = head + records.channel(row)
         return number
 
+    def schema_id(
+        self, name: str, text: str | bytes, encoding: str = "ros2msg", wanted: int | None = None
+    ) -> int:
+        """The id of a message definition, taken in (as `wanted` if free) unless it is known."""
+        data = text.encode() if isinstance(text, str) else text
+        for row in self._schemas.values():
+            if (row.name, row.encoding, row.data) == (name, encoding, data):
+                return row.id
+        return self.add_schema(name, data, encoding, None if wanted in self._schemas else wanted)
+
+    def channel_id(
+        self,
+        topic: str,
+        schema_id: int,
+        metadata: Mapping[str, str],
+        message_encoding: str = "cdr",
+        wanted: int | None = None,
+    ) -> int:
+        """The id of a channel, taken in (as `wanted` if free) unless it is known."""
+        known = (topic, schema_id, message_encoding, dict(metadata))
+        for row in self._channels.values():
+            if (row.topic, row.schema_id, row.message_encoding, row.metadata) == known:
+                return row.id
+        number = None if wanted in self._channels else wanted
+        return self.add_channel(topic, schema_id, metadata, message_encoding, number)
+
     def write_chunk(
         self,
         channel_id: int,
@@ -98,30 +127,44 @@ class FileWriter:
             return
         lead = standalone or channel_id not in self._introduced
         head = self._heads[channel_id] if lead else b""
+        self._introduced.add(channel_id)
+        shifted = np.add(offsets, np.uint64(len(head)), casting="unsafe")
+        self._put_chunk((head, data), compression, {channel_id: (log_times_ns, shifted)})
+
+    def write_records(
+        self, data: Buffer, indexes: Mapping[int, MessageIndex], compression: str
+    ) -> None:
+        """Write a chunk of any records as they are; `indexes` by channel id, offsets in `data`."""
+        self._put_chunk((b"", data), compression, indexes)
+
+    def _put_chunk(
+        self, parts: tuple[bytes, Buffer], compression: str, indexes: Mapping[int, MessageIndex]
+    ) -> None:
+        head, data = parts
         body = compress(_joined(head, data, compression), compression)
+        pieces = [head, body] if head and not compression else [body]
         crc = zlib.crc32(data, zlib.crc32(head))
-        pieces = [head, body] if compression == "" and head else [body]
-        size = len(head) + len(data)
-        start, end = int(log_times_ns.min()), int(log_times_ns.max())
-        stored = sum(len(piece) for piece in pieces)
+        size, stored = len(head) + len(data), sum(len(piece) for piece in pieces)
+        start = min(int(times.min()) for times, _ in indexes.values())
+        end = max(int(times.max()) for times, _ in indexes.values())
         front = records.chunk_head(start, end, size, crc, compression, stored)
-        index = _message_index(channel_id, log_times_ns, offsets, len(head))
-        chunk_length = len(front) + stored
-        at = self._size
-        self._write([front, *pieces, index])
+        length = len(front) + stored
+        packed = [_message_index(number, *rows) for number, rows in indexes.items()]
+        ends = np.cumsum([self._size + length, *map(len, packed)]).tolist()
+        places = dict(zip(indexes, ends, strict=False))
         entry = ChunkEntry(
             start,
             end,
-            at,
-            chunk_length,
-            {channel_id: at + chunk_length},
-            len(index),
+            self._size,
+            length,
+            places,
+            ends[-1] - ends[0],
             compression,
             stored,
             size,
         )
-        self._introduced.add(channel_id)
-        self._note(entry, {channel_id: len(offsets)})
+        self._write([front, *pieces, *packed])
+        self._note(entry, {number: len(times) for number, (times, _) in indexes.items()})
 
     def copy_chunk(self, entry: ChunkEntry, raw: Buffer, counts: Mapping[int, int]) -> None:
         """Copy a chunk of another file as it is: `raw` is its record and its message indexes.
@@ -213,10 +256,10 @@ def _joined(head: bytes, data: Buffer, compression: str) -> Buffer:
 
 
 def _message_index(
-    channel_id: int, log_times_ns: NDArray[np.uint64], offsets: NDArray[np.uint64], shift: int
+    channel_id: int, log_times_ns: NDArray[np.uint64], offsets: NDArray[np.uint64]
 ) -> bytes:
     rows = np.empty((len(offsets), 2), "<u8")
     rows[:, 0] = log_times_ns
-    np.add(offsets, np.uint64(shift), out=rows[:, 1], casting="unsafe")
+    rows[:, 1] = offsets
     head = struct.pack("<HI", channel_id, rows.nbytes)
     return records.record(records.MESSAGE_INDEX, head, rows.tobytes())
