@@ -1,1 +1,1 @@
-"""Sections of the report, found by name."""
+"""Sections of the report, one plug-in each: the runs of a report to blocks of content."""

@@ -1,0 +1,80 @@
+/* Turns the drawings into live plots, one after the other, and ties them to the cursor. */
+
+const json = (id) => JSON.parse(document.getElementById(id).textContent);
+
+/* The bar under the page: a slider over the places of one domain, and what was there in words. */
+const MOST_WORDS = 4;
+
+function wordsAt(bus, at, domain) {
+  const words = [];
+  for (const [key, x] of at) {
+    words.push(key.includes("/time") ? `t = ${x.toFixed(2)} s` : `s = ${x.toFixed(1)} ${key.endsWith("/px") ? "px" : "mm"}`);
+  }
+  const told = new Set();
+  for (const { spec, u, words: tell, extent } of bus.plots) {
+    const x = at.get(spec.domain);
+    if (spec.domain !== domain || x < extent[0] || x > extent[1]) continue;
+    tell(nearest(u.data[0], x)).forEach((text, i) => {
+      const { label } = spec.series[i];
+      if (told.size < MOST_WORDS && !told.has(label)) { told.add(label); words.push(`${label} ${text}`); }
+    });
+  }
+  return words.join("  ·  ");
+}
+
+function makeSlider(bus, domain, places, name) {
+  const slider = document.getElementById("cursor-place");
+  const text = document.getElementById("cursor-text");
+  document.getElementById("cursor-label").textContent = name;
+  slider.max = String(places.length - 1);
+  slider.addEventListener("input", () => bus.show(domain, places[Number(slider.value)]));
+  bus.watchers.push((at) => {
+    const here = at.get(domain);
+    text.textContent = wordsAt(bus, at, domain);
+    slider.setAttribute("aria-valuetext", text.textContent);
+    if (here !== undefined) slider.value = String(nearest(places, here));
+  });
+  document.getElementById("cursor").hidden = false;
+  document.body.classList.add("with-cursor");
+  bus.show(domain, places[0]);
+}
+
+function watchLinks(bus) {
+  for (const link of document.querySelectorAll("a.place[data-domain]")) {
+    link.addEventListener("click", () => bus.show(link.dataset.domain, Number(link.dataset.x)));
+  }
+}
+
+async function enliven() {
+  const report = json("seamlog-report");
+  const read = columnReader(json("seamlog-data"));
+  const bus = makeBus();
+  watchTheme(() => bus.plots.forEach((plot) => plot.u.redraw(false)));
+  for (const link of report.links) {
+    bus.links.push({ ...link, source_x: await read(link.source_x), target_x: await read(link.target_x) });
+  }
+  for (const block of report.sections.flatMap((section) => section.blocks)) {
+    const figure = block.id === undefined ? null : document.getElementById(block.id);
+    if (block.kind === "picture" && block.track) bus.photos.push(await makePhoto(figure, block, read, bus));
+    if (block.kind !== "time_plot" && block.kind !== "seam_plot") continue;
+    const plot = await makePlot(figure, block, read, bus);
+    if (plot === null) continue;
+    bus.plots.push(plot);
+    watchKeys(plot, bus);
+    figure.classList.add("is-live");
+  }
+  const link = bus.links[0], photo = bus.photos[0], plot = bus.plots[0];
+  if (link) makeSlider(bus, link.source, link.source_x, "Along the seam");
+  else if (photo) makeSlider(bus, photo.domain, photo.x, "Along the bead");
+  else if (plot) makeSlider(bus, plot.spec.domain, plot.u.data[0], "Place");
+  watchLinks(bus);
+  const first = document.querySelector("#verdict a.place[data-domain]");
+  if (first) bus.show(first.dataset.domain, Number(first.dataset.x));
+}
+
+enliven()
+  .then(() => { document.documentElement.dataset.state = "live"; })
+  .catch((error) => {
+    document.documentElement.dataset.state = "static";
+    document.documentElement.dataset.reason = String(error);
+  });

@@ -1,0 +1,117 @@
+/* One live plot in the place of its drawing: every point, thinned only while drawing. */
+
+const PLOT_HEIGHT = 250, STRIP_HEIGHT = 165;
+const FONT = "12px system-ui, sans-serif";
+
+/* A point of a curve with as many decimals as its series allows. */
+function quantityText(value, expanded, series) {
+  if (value === null || value === undefined) return "no value";
+  const text = series.band_label.startsWith("±") && expanded !== null
+    ? `${value.toFixed(series.decimals)} ± ${expanded.toFixed(series.decimals)}`
+    : value.toFixed(series.decimals);
+  return `${text} ${series.unit}`.trim().replaceAll("-", "−");
+}
+
+function seriesOf(spec) {
+  const list = [{ label: spec.x_label }];
+  const bands = [], places = [];
+  spec.series.forEach((series, i) => {
+    const stroke = () => colour(`--c${i + 1}`);
+    const paths = series.step ? uPlot.paths.stepped({ align: 1 }) : undefined;
+    const points = { show: false };
+    places.push(list.length);
+    list.push({ label: series.label, stroke, width: 1.5, paths, points, spanGaps: false });
+    if (series.low && series.high) {
+      const edge = { stroke: "transparent", width: 0, points };
+      list.push({ ...edge, label: "high" }, { ...edge, label: "low" });
+      bands.push({ series: [list.length - 2, list.length - 1], fill: () => colour(`--band${i + 1}`) });
+    }
+  });
+  return { list, bands, places };
+}
+
+async function dataOf(spec, read) {
+  const columns = [await read(spec.x)];
+  for (const series of spec.series) {
+    columns.push(await read(series.values));
+    if (series.low && series.high) columns.push(await read(series.high), await read(series.low));
+  }
+  return columns;
+}
+
+function axisOf(label, extra) {
+  const grid = { stroke: () => colour("--grid"), width: 1 };
+  const values = (_, splits) => splits.map((value) => (value === null ? "" : String(+value.toPrecision(12)).replace("-", "−")));
+  return { stroke: () => colour("--muted"), font: FONT, labelFont: FONT, label, labelSize: 18, labelGap: 2, grid, ticks: grid, values, ...extra };
+}
+
+function drawLines(u, spec) {
+  const { ctx, bbox } = u;
+  const line = (x0, y0, x1, y1) => { ctx.beginPath(); ctx.moveTo(x0, y0); ctx.lineTo(x1, y1); ctx.stroke(); };
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  ctx.lineWidth = 1.5 * devicePixelRatio;
+  ctx.setLineDash([6 * devicePixelRatio, 4 * devicePixelRatio]);
+  ctx.strokeStyle = colour("--limit");
+  for (const limit of spec.limits) {
+    const y = u.valToPos(limit.value, "y", true);
+    line(bbox.left, y, bbox.left + bbox.width, y);
+  }
+  ctx.setLineDash([2 * devicePixelRatio, 3 * devicePixelRatio]);
+  ctx.strokeStyle = colour("--mark");
+  for (const mark of spec.marks) {
+    const x = u.valToPos(mark.x, "x", true);
+    line(x, bbox.top, x, bbox.top + bbox.height);
+  }
+  ctx.restore();
+}
+
+/* Range of y: the values in view and the limits, with some air. */
+function rangeOf(spec) {
+  return (_, low, high) => {
+    let bottom = low ?? Infinity, top = high ?? -Infinity;
+    for (const limit of spec.limits) { bottom = Math.min(bottom, limit.value); top = Math.max(top, limit.value); }
+    if (!(top >= bottom)) return [0, 1];
+    const air = 0.06 * (top - bottom || Math.abs(top) || 1);
+    return [bottom - air, top + air];
+  };
+}
+
+async function makePlot(figure, spec, read, bus) {
+  const data = await dataOf(spec, read);
+  if (data[0].length < 2) return null;
+  const { list, bands, places } = seriesOf(spec);
+  const height = spec.compact ? STRIP_HEIGHT : PLOT_HEIGHT;
+  const box = figure.querySelector(".live");
+  const now = figure.querySelectorAll(".now");
+  const extent = [data[0][0], data[0][data[0].length - 1]];
+  const plot = { figure, spec, extent, u: null };
+  plot.words = (index) => spec.series.map((series, i) => {
+    const value = data[places[i]][index];
+    const high = series.low && series.high ? data[places[i] + 1][index] : null;
+    return quantityText(value, high === null ? null : high - value, series);
+  });
+  plot.tell = (index) => {
+    const words = index === null ? [] : plot.words(index);
+    now.forEach((place, i) => { place.textContent = words[i] ?? ""; });
+  };
+  plot.u = new uPlot({
+    width: Math.max(box.clientWidth, 280), height, series: list, bands,
+    legend: { show: false },
+    padding: [8, 12, 0, 0],
+    scales: { x: { time: false }, y: { range: rangeOf(spec) } },
+    axes: [axisOf(`${spec.x_label} [${spec.x_unit}]`, { size: 30 }), axisOf(spec.y_label, { size: 52 })],
+    cursor: { y: false, drag: { x: true, y: false, setScale: true }, bind: { mouseleave: () => null } },
+    hooks: {
+      setCursor: [(u) => bus.moved(plot, u)],
+      setScale: [(u, key) => { if (key === "x") bus.zoomed(plot, u.scales.x.min, u.scales.x.max); }],
+      draw: [(u) => drawLines(u, spec)],
+    },
+  }, data, box);
+  new ResizeObserver(() => {
+    if (box.clientWidth > 0) plot.u.setSize({ width: box.clientWidth, height });
+  }).observe(box);
+  return plot;
+}

@@ -1,0 +1,74 @@
+"""Pictures of the results: no larger than a page can show, tied to the places of the bead."""
+
+from pathlib import Path
+
+import numpy as np
+
+from seamlog.results import Part
+
+from .content import AnyBlock, Column, Notice, PictureBlock, Track
+from .run import Run
+
+MEDIA_TYPES = {
+    ".webp": "image/webp",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".jpeg": "image/jpeg",
+}
+_WIDEST_PX = 1600
+_MOST_BYTES = 400_000
+_QUALITY = 80
+_TOES = ("left_x_px", "left_y_px", "right_x_px", "right_y_px")
+
+
+def picture_block(run: Run, part: Part, name: str, track: Track | None = None) -> AnyBlock:
+    """A picture of `part`; one in a format that browsers do not share becomes a notice."""
+    picture = part.pictures[name]
+    media_type = MEDIA_TYPES.get(Path(picture.file).suffix.lower())
+    if media_type is None:
+        return Notice(text=f"Picture {picture.file}: not shown", reason="Its format is not known.")
+    image = run.results.picture(part, name)
+    if picture.width_px > _WIDEST_PX or len(image) > _MOST_BYTES:
+        image, media_type = _reduced(image, media_type)
+    return PictureBlock(
+        id=f"picture-{run.index}-{part.stem}-{name}".replace(".", "-"),
+        caption=picture.caption,
+        alt=picture.caption or f"{part.title}: {name}",
+        media_type=media_type,
+        width_px=picture.width_px,
+        height_px=picture.height_px,
+        sha256=picture.sha256,
+        image=image,
+        track=track,
+    )
+
+
+def toe_track(run: Run, part: Part, table: str = "stations") -> Track | None:
+    """Where the stations of a bead lie on its photo, or None if the table does not say."""
+    entry = part.tables.get(table)
+    if entry is None or not set(_TOES) <= set(entry.columns):
+        return None
+    columns = run.columns(part, table)
+    axis = "s_mm" if "s_mm" in columns else "s_px"
+    if axis not in columns:
+        return None
+    order = np.argsort(columns[axis], kind="stable")
+    suffix = "" if axis == "s_mm" else "/px"
+    toes = {name: Column(values=columns[name][order]) for name in _TOES}
+    x = Column(values=columns[axis][order])
+    return Track(domain=run.seam_domain(part) + suffix, x=x, **toes)
+
+
+def _reduced(image: bytes, media_type: str) -> tuple[bytes, str]:
+    """The picture as WebP at most `_WIDEST_PX` wide; as it is where that does not work."""
+    import cv2
+
+    decoded = cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_COLOR)
+    if decoded is None:
+        return image, media_type
+    rows, columns = decoded.shape[:2]
+    if columns > _WIDEST_PX:
+        size = (_WIDEST_PX, max(round(rows * _WIDEST_PX / columns), 1))
+        decoded = cv2.resize(decoded, size, interpolation=cv2.INTER_AREA)
+    done, coded = cv2.imencode(".webp", decoded, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+    return (coded.tobytes(), "image/webp") if done else (image, media_type)

@@ -1,0 +1,161 @@
+"""Tables to plots by one rule: `stamp_ns` makes a time plot, `s_mm` a plot along the seam.
+
+Columns of one unit share a plot, errors apart from what they are the error of. `u_<name>` is the
+standard uncertainty of `<name>` and becomes its band of U (k = 2); `band_low_<name>` and
+`band_high_<name>` are the band of the column whose name ends alike.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seamlog.results import Part
+
+from .content import Column, Limit, Mark, SeamPlot, Series, TimePlot
+from .numbers import COVERAGE
+from .run import Run
+
+Columns = dict[str, NDArray[Any]]
+_AXES = ("stamp_ns", "s_mm", "s_px")
+_SUFFIXES = {
+    "mm": "mm",
+    "mm_s": "mm/s",
+    "m_s": "m/s",
+    "m": "m",
+    "px": "px",
+    "a": "A",
+    "v": "V",
+    "s": "s",
+    "ns": "ns",
+    "kj_mm": "kJ/mm",
+    "m_min": "m/min",
+}
+"""Endings of names that are units, longest match first."""
+_STRIPS = 3
+"""From this many plots of one table on, they are drawn as low strips."""
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A column name as words and the unit at its end: weld_speed_mm_s -> weld speed, mm/s."""
+    for suffix in sorted(_SUFFIXES, key=len, reverse=True):
+        if name.endswith(f"_{suffix}"):
+            return name[: -len(suffix) - 1].replace("_", " "), _SUFFIXES[suffix]
+    return name.replace("_", " "), ""
+
+
+def plots_of(run: Run, part: Part, table: str, title: str = "") -> list[TimePlot | SeamPlot]:
+    """Every plottable column of a table, one plot per unit; a table without axis gives none."""
+    units = part.tables[table].columns
+    axis = next((name for name in ("s_mm", "s_px", "stamp_ns") if name in units), None)
+    if axis is None:
+        return []
+    columns = run.columns(part, table)
+    groups = _by_unit(columns, units)
+    compact = len(groups) >= _STRIPS
+    return [make_plot(run, part, table, names, title, compact=compact) for names in groups]
+
+
+def make_plot(
+    run: Run,
+    part: Part,
+    table: str,
+    names: Sequence[str],
+    title: str = "",
+    limits: Sequence[Limit] = (),
+    caption: str = "",
+    label: str = "",
+    compact: bool = False,
+) -> TimePlot | SeamPlot:
+    """One plot of the columns `names` of a table, over time or along the seam."""
+    columns = run.columns(part, table)
+    units = part.tables[table].columns
+    axis = next(name for name in ("s_mm", "s_px", "stamp_ns") if name in columns)
+    x, ordered = _ordered(run, axis, columns)
+    series = [_series(name, units, ordered, single=len(names) == 1) for name in names]
+    words = label or ", ".join(dict.fromkeys(s.label for s in series))
+    common: dict[str, Any] = {
+        "id": f"plot-{run.index}-{part.stem}-{table}-{names[0]}".replace(".", "-"),
+        "title": title or f"{words[:1].upper()}{words[1:]}",
+        "caption": caption,
+        "x": Column(values=x),
+        "y_label": _axis_label(words if len(words) < 40 else table, series[0].unit),
+        "series": series,
+        "limits": list(limits),
+        "compact": compact,
+    }
+    if axis == "stamp_ns":
+        return TimePlot(domain=run.time_domain, x_label="time", x_unit="s", **common)
+    return SeamPlot(
+        domain=run.seam_domain(part) + ("/px" if axis == "s_px" else ""),
+        x_label="along the seam",
+        x_unit=split_unit(axis)[1],
+        marks=_marks(part, axis),
+        **common,
+    )
+
+
+def _ordered(run: Run, axis: str, columns: Columns) -> tuple[NDArray[Any], Columns]:
+    """Ascending x known everywhere, and the other columns in the same order."""
+    raw = columns[axis]
+    x = run.seconds(raw) if axis == "stamp_ns" else raw.astype(np.float64)
+    order = np.flatnonzero(np.isfinite(x))
+    if np.any(np.diff(x[order]) < 0):
+        order = order[np.argsort(x[order], kind="stable")]
+    return x[order], {name: values[order] for name, values in columns.items()}
+
+
+def _series(name: str, units: dict[str, str], columns: Columns, single: bool) -> Series:
+    label, guessed = split_unit(name)
+    low, high, band = _band(name, columns, single)
+    return Series(
+        label=label,
+        unit=units.get(name) or guessed,
+        values=Column(values=columns[name].astype(np.float64)),
+        low=None if low is None else Column(values=low),
+        high=None if high is None else Column(values=high),
+        band_label=band,
+        step=label.endswith("command"),
+    )
+
+
+def _band(
+    name: str, columns: Columns, single: bool
+) -> tuple[NDArray[Any] | None, NDArray[Any] | None, str]:
+    if f"u_{name}" in columns:
+        value, expanded = columns[name], COVERAGE * columns[f"u_{name}"]
+        return value - expanded, value + expanded, f"± U (k = {COVERAGE})"
+    for low in columns:
+        high = low.replace("band_low_", "band_high_")
+        stem = low.removeprefix("band_low_")
+        if single and stem != low and high in columns and name.endswith(stem):
+            return columns[low], columns[high], "band"
+    return None, None, ""
+
+
+def _by_unit(columns: Columns, units: dict[str, str]) -> list[list[str]]:
+    groups: dict[str, list[str]] = {}
+    for name, values in columns.items():
+        if name in _AXES or name.startswith(("u_", "band_low_", "band_high_")):
+            continue
+        if values.dtype.kind not in "fiu" or not np.isfinite(values.astype(np.float64)).any():
+            continue
+        unit = units.get(name) or split_unit(name)[1]
+        own = "error " if split_unit(name)[0].endswith("error") else ""
+        groups.setdefault(own + (unit or name), []).append(name)
+    return list(groups.values())
+
+
+def _axis_label(words: str, unit: str) -> str:
+    return f"{words} [{unit}]" if unit and unit != "1" else words
+
+
+def _marks(part: Part, axis: str) -> list[Mark]:
+    if axis != "s_mm":
+        return []
+    return [
+        Mark(x=finding.place.s_mm, label=finding.message)
+        for finding in part.findings
+        if finding.place is not None and finding.place.s_mm is not None
+    ]

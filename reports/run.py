@@ -1,0 +1,134 @@
+"""One results directory as the report sees it: parts, tables, its time line and its places."""
+
+import hashlib
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seamlog.errors import ResultsError
+from seamlog.results import Finding, Part, Place, Results
+
+from .content import FindingLine, PlaceLink
+from .numbers import format_number
+
+KINDS = {
+    "bead": "Bead",
+    "join": "Join of bead and log",
+    "tracking": "Tracking",
+    "replay": "Replay",
+    "identification": "Identification",
+    "health": "Recording health",
+}
+"""Parts a whole analysis writes, in the order of the report, and what people call them."""
+
+
+class Run:
+    """One results directory, read once; `index` counts the directories of the report."""
+
+    def __init__(self, results: Results, index: int) -> None:
+        self.results = results
+        self.index = index
+        self.parts = results.parts()
+        self._columns: dict[tuple[str, str], dict[str, NDArray[Any]]] = {}
+        self.label = self._label()
+        self.origin_ns = self._origin_ns()
+
+    def of(self, kind: str) -> list[Part]:
+        """The parts of one kind, by index."""
+        return sorted((p for p in self.parts if p.part == kind), key=lambda part: part.index)
+
+    def columns(self, part: Part, table: str) -> dict[str, NDArray[Any]]:
+        """A table of `part` as arrays by column name."""
+        key = (part.stem, table)
+        if key not in self._columns:
+            self._columns[key] = self.results.columns(part, table)
+        return self._columns[key]
+
+    def seconds(self, stamp_ns: NDArray[Any]) -> NDArray[np.float64]:
+        """Stamps as seconds on the run's time line, to the nearest microsecond."""
+        ticks = (stamp_ns.astype(np.int64) - self.origin_ns + 500) // 1000
+        seconds: NDArray[np.float64] = ticks / 1e6
+        return seconds
+
+    @property
+    def time_domain(self) -> str:
+        """Name of the axis that all time plots of this run share."""
+        return f"{self.index}/time"
+
+    def seam_domain(self, part: Part) -> str:
+        """Name of the axis along the bead of `part`; one per weld, or per photo without one."""
+        return f"{self.index}/seam/{part.weld or part.index}"
+
+    def end_ns(self) -> int | None:
+        """End of the weld or recording as the parts state it; None if none does."""
+        stated = [part.details.get("end_ns") for part in self.parts]
+        for part in self.parts:
+            figure = part.figure("end_ns")
+            stated.append(figure.value if figure else None)
+        known = [int(value) for value in stated if isinstance(value, int | float)]
+        return max(known, default=None)
+
+    def place(self, part: Part, place: Place | None) -> PlaceLink | None:
+        """Where a finding of `part` is, as something to jump to."""
+        if place is None or (place.s_mm is None and place.time_ns is None):
+            return None
+        words = []
+        if place.s_mm is not None:
+            words.append(f"s = {format_number(place.s_mm, 1)} mm")
+        seconds = None
+        if place.time_ns is not None:
+            seconds = float(self.seconds(np.array([place.time_ns]))[0])
+            words.append(f"t = {format_number(seconds, 2)} s")
+        if place.s_mm is not None:
+            domain = f"{self.index}/seam/{place.weld or part.weld or part.index}"
+            return PlaceLink(text=", ".join(words), section="bead", domain=domain, x=place.s_mm)
+        section = part.part if part.part in KINDS else "tracking"
+        return PlaceLink(text=", ".join(words), section=section, domain=self.time_domain, x=seconds)
+
+    def lines(self, part: Part, findings: Iterable[Finding]) -> list[FindingLine]:
+        """Findings of `part` with places to jump to."""
+        return [
+            FindingLine(severity=f.severity, message=f.message, place=self.place(part, f.place))
+            for f in findings
+        ]
+
+    def fingerprint(self) -> bytes:
+        """SHA-256 over all parts; refuses files that were changed after the analysis."""
+        digest = hashlib.sha256()
+        for part in self.parts:
+            digest.update(part.model_dump_json().encode())
+            for table in part.tables.values():
+                self._check(table.file, table.sha256)
+            for picture in part.pictures.values():
+                self._check(picture.file, picture.sha256)
+        return digest.digest()
+
+    def _check(self, file: str, sha256: str) -> None:
+        path = self.results.folder / Path(file).name
+        if hashlib.sha256(path.read_bytes()).hexdigest() != sha256:
+            raise ResultsError(f"{path} was changed after the analysis; run analyze again")
+
+    def _label(self) -> str:
+        names = [entry.name for part in self.parts for entry in part.inputs]
+        sessions = [name for name in names if name.endswith(".mcap")]
+        return next(iter(sessions + names), f"results {self.index + 1}")
+
+    def _origin_ns(self) -> int:
+        """First stamp of any table: zero of the time line."""
+        firsts = [
+            int(stamps.min())
+            for part in self.parts
+            for name, table in part.tables.items()
+            if "stamp_ns" in table.columns and part.part != "join"
+            if (stamps := self.columns(part, name)["stamp_ns"]).size
+        ]
+        return min(firsts, default=0)
+
+
+def utc_date(time_ns: int) -> str:
+    """The day of a log time, as 2026-01-31, in UTC."""
+    return datetime.fromtimestamp(time_ns // 1_000_000_000, UTC).date().isoformat()

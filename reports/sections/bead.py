@@ -1,0 +1,94 @@
+"""The bead: its photo with the measured toes, width along the weld, and how width is spread."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seamlog.reports.content import AnyBlock, Histogram, Limit, SeamPlot, TimePlot
+from seamlog.reports.numbers import format_quantity
+from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots
+from seamlog.reports.pictures import picture_block, toe_track
+from seamlog.reports.plots import make_plot, split_unit
+from seamlog.reports.run import Run
+from seamlog.reports.verdicts import statement
+from seamlog.results import Part
+
+_STATIONS = "stations"
+_OVERLAY = "overlay"
+_WIDTHS = ("width_mm", "width_px")
+_MOST_BINS = 40
+
+
+def section(runs: Sequence[Run]) -> list[AnyBlock]:
+    """Photo and width, tied by the cursor; histogram; figures and limits."""
+    return each_part(runs, "bead", _blocks)
+
+
+def _blocks(run: Run, part: Part) -> list[AnyBlock]:
+    return [
+        *_photo(run, part),
+        *_width(run, part),
+        statement(part),
+        *criteria(run, part),
+        *findings(run, part),
+        *figures(part),
+        *plots(run, part, leave_out=(_STATIONS,)),
+        *pictures(run, part, leave_out=(_OVERLAY,)),
+    ]
+
+
+def _photo(run: Run, part: Part) -> list[AnyBlock]:
+    if _OVERLAY not in part.pictures:
+        return []
+    return [picture_block(run, part, _OVERLAY, toe_track(run, part))]
+
+
+def _width(run: Run, part: Part) -> list[AnyBlock]:
+    """Width along the bead with its band of U and the limits, and its histogram."""
+    names = part.tables[_STATIONS].columns if _STATIONS in part.tables else {}
+    name = next((name for name in _WIDTHS if name in names), None)
+    if name is None:
+        return []
+    plot = make_plot(
+        run, part, _STATIONS, [name], title="Bead width along the weld", limits=_limits(part, name)
+    )
+    return [plot, *_histogram(plot)]
+
+
+def _limits(part: Part, name: str) -> list[Limit]:
+    """Limits on the width itself (not on its spread), once each."""
+    stem = name.rsplit("_", 1)[0]
+    found: dict[float, Limit] = {}
+    for criterion in part.criteria:
+        if criterion.unit != split_unit(name)[1] or criterion.name not in _on_value(stem, name):
+            continue
+        for word, value in (("lower", criterion.lower), ("upper", criterion.upper)):
+            if value is not None:
+                text = format_quantity(value, unit=criterion.unit)
+                found[value] = Limit(label=f"{word} limit {text}", value=value)
+    return list(found.values())
+
+
+def _on_value(stem: str, name: str) -> tuple[str, ...]:
+    unit = name.removeprefix(f"{stem}_")
+    return (name, stem, *(f"{stem}_{kind}_{unit}" for kind in ("mean", "min", "max", "station")))
+
+
+def _histogram(plot: SeamPlot | TimePlot) -> list[AnyBlock]:
+    series = plot.series[0]
+    known = series.values.values[np.isfinite(series.values.values)]
+    if known.size < 2 or np.ptp(known) == 0:
+        return []
+    bins = int(min(max(len(np.histogram_bin_edges(known, "fd")) - 1, 8), _MOST_BINS))
+    counts, edges = np.histogram(known, bins)
+    return [
+        Histogram(
+            id=f"{plot.id}-histogram",
+            title="How the width is spread",
+            x_label=series.label,
+            unit=series.unit,
+            edges=[float(edge) for edge in edges],
+            counts=[int(count) for count in counts],
+            limits=plot.limits,
+        )
+    ]

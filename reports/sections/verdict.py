@@ -1,0 +1,49 @@
+"""First screen: is this weld good, where not, and why."""
+
+from collections.abc import Sequence
+
+from seamlog.reports.content import AnyBlock, Findings, KeyFigures
+from seamlog.reports.run import Run
+from seamlog.reports.verdicts import overall
+from seamlog.results import Figure, Severity
+
+_KEYS = (
+    ("bead", ("width_mean_mm", "width_std_mm", "width_range_mm", "width_mean_px", "width_std_px")),
+    ("tracking", ("error_rms_mm", "error_peak_mm")),
+    ("health", ("dropped", "lost")),
+)
+"""Figures for the first screen, those that are there; a kind with none of them shows its first."""
+_RANKS = {Severity.FAULT: 0, Severity.WARNING: 1, Severity.INFO: 2}
+_MOST_LINES = 6
+
+
+def section(runs: Sequence[Run]) -> list[AnyBlock]:
+    """The verdict, the key figures and what went wrong where."""
+    blocks: list[AnyBlock] = [overall(runs)]
+    blocks += [KeyFigures(figures=found) for run in runs if (found := _key_figures(run))]
+    blocks += _what_went_wrong(runs)
+    return blocks
+
+
+def _key_figures(run: Run) -> list[Figure]:
+    chosen = []
+    for kind, names in _KEYS:
+        for part in run.of(kind)[:1]:
+            listed = [found for name in names if (found := part.figure(name))]
+            chosen += listed[:3] or part.figures[:2]
+    return chosen
+
+
+def _what_went_wrong(runs: Sequence[Run]) -> list[AnyBlock]:
+    lines = [
+        line
+        for run in runs
+        for kind in ("join", "bead", "tracking", "health")
+        for part in run.of(kind)
+        for line in run.lines(part, part.findings)
+        if kind == "join" or line.severity is not Severity.INFO
+    ]
+    worst_first = sorted(lines, key=lambda line: _RANKS[line.severity])[:_MOST_LINES]
+    if not worst_first:
+        return []
+    return [Findings(caption="What went wrong, where and why", findings=worst_first)]

@@ -1,0 +1,109 @@
+"""The overall verdict: the worst of what was assessed; what was not is said beside it."""
+
+from collections.abc import Sequence
+
+from seamlog.results import Criterion, Part, Severity, Verdict, worst
+
+from .content import Banner, FindingLine, Statement
+from .numbers import format_quantity
+from .run import KINDS, Run
+
+_ASSESSED = (Verdict.PASS, Verdict.FAIL)
+
+
+def overall(runs: Sequence[Run]) -> Banner:
+    """Verdict over all parts of all runs, with the failed criteria and each part's statement."""
+    parts = [(run, part) for run in runs for part in run.parts]
+    assessed = [part.verdict for _, part in parts if part.verdict in _ASSESSED]
+    verdict = worst(assessed)
+    return Banner(
+        verdict=verdict,
+        summary=_summary(verdict, [part for _, part in parts]),
+        reasons=[line for run, part in parts for line in _failures(run, part)],
+        statements=_statements(runs),
+    )
+
+
+def sentence(criterion: Criterion) -> str:
+    """What a criterion says, as one line: value, limits, reason."""
+    words = criterion.label
+    if criterion.value is not None:
+        words += f": {format_quantity(criterion.value, criterion.u, criterion.unit)}"
+    limits = limits_text(criterion)
+    words += f" (limit {limits})" if limits else ""
+    return f"{words}; {criterion.reason}" if criterion.reason else words
+
+
+def limits_text(criterion: Criterion) -> str:
+    """The limits of a criterion as text, '' if it has none."""
+    lower = None if criterion.lower is None else format_quantity(criterion.lower)
+    upper = None if criterion.upper is None else format_quantity(criterion.upper)
+    unit = f" {criterion.unit}" if criterion.unit and criterion.unit != "1" else ""
+    if lower is not None and upper is not None:
+        return f"{lower} to {upper}{unit}"
+    if upper is not None:
+        return f"at most {upper}{unit}"
+    return f"at least {lower}{unit}" if lower is not None else ""
+
+
+def _summary(verdict: Verdict, parts: list[Part]) -> str:
+    criteria = [c for part in parts for c in part.criteria if c.verdict in _ASSESSED]
+    failed = sum(c.verdict is Verdict.FAIL for c in criteria)
+    if verdict is Verdict.FAIL:
+        return f"{failed} of {len(criteria)} limits are not met." if failed else "A part failed."
+    if verdict is Verdict.PASS:
+        return f"All {len(criteria)} limits that were assessed are met."
+    if any(part.criteria for part in parts):
+        return "None of the limits could be assessed."
+    return "No limits were given, so nothing was judged. The figures below are measured values."
+
+
+def _failures(run: Run, part: Part) -> list[FindingLine]:
+    failed = [c for c in part.criteria if c.verdict is Verdict.FAIL]
+    lines = [
+        FindingLine(severity=Severity.FAULT, message=sentence(c), place=run.place(part, c.place))
+        for c in failed
+    ]
+    if not lines and part.verdict is Verdict.FAIL:
+        message = f"{part.title}: {part.reason or 'failed'}"
+        lines.append(FindingLine(severity=Severity.FAULT, message=message))
+    return lines
+
+
+def _statements(runs: Sequence[Run]) -> list[Statement]:
+    found = []
+    for run in runs:
+        prefix = f"{run.label}: " if len(runs) > 1 else ""
+        known = {part.part for part in run.parts}
+        for kind in [*KINDS, *sorted(known - set(KINDS))]:
+            found += [statement(part, prefix) for part in run.of(kind)]
+            if kind not in known:
+                found.append(_missing(kind, prefix))
+    return found
+
+
+def statement(part: Part, prefix: str = "") -> Statement:
+    """A part's verdict and its reason."""
+    reason = part.reason
+    if not reason and part.verdict is Verdict.NOT_ASSESSED and not part.criteria:
+        reason = "No limits were given."
+    return Statement(
+        subject=prefix + part.title, verdict=part.verdict, reason=reason, section=part.part
+    )
+
+
+def grouped(statements: Sequence[Statement]) -> list[tuple[Verdict, list[Statement]]]:
+    """Statements by verdict, in the order FAIL, PASS, then what was not assessed."""
+    order = (Verdict.FAIL, Verdict.PASS, Verdict.NOT_MEASURABLE, Verdict.NOT_ASSESSED)
+    groups = [(verdict, [s for s in statements if s.verdict is verdict]) for verdict in order]
+    return [(verdict, members) for verdict, members in groups if members]
+
+
+def _missing(kind: str, prefix: str) -> Statement:
+    return Statement(
+        subject=prefix + KINDS[kind],
+        verdict=Verdict.NOT_ASSESSED,
+        reason="not recorded: the results hold no such part",
+        section=kind,
+        missing=True,
+    )
