@@ -52,8 +52,8 @@ def replay(
     counterfactual one puts it in closed loop with the identified axis and predicts the error.
     """
     from seamlog.analysis.axis_record import load_axis_record
+    from seamlog.analysis.live_controller import live_controller
     from seamlog.analysis.replay.inputs import replay_inputs
-    from seamlog.analysis.replay.live import live_controller
     from seamlog.analysis.replay.output import write_replay
     from seamlog.analysis.replay.part import replay_part
     from seamlog.analysis.replay.run import replay as run_replay

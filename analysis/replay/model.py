@@ -7,10 +7,9 @@ import numpy as np
 from seamlog.analysis.axis_record import AxisRecord, FloatArray
 from seamlog.analysis.identification.gated import USUAL_DELAY
 from seamlog.analysis.identification.identify import identify_axis
+from seamlog.analysis.live_controller import LiveController
 from seamlog.contracts import Axis
 from seamlog.errors import EvidenceError
-
-from .live import LiveController
 
 _NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 _LEAST_SHARE = 1e-3

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.analysis.axis_record import COMMAND, ENCODER, FloatArray
+from seamlog.channels import CHANNELS
 from seamlog.mcap.batch import BatchWriter
 
 from .run import ControllerRun, EstimatorRun, Replay
@@ -51,7 +52,7 @@ class _Outputs:
     ) -> None:
         self._writer.write_as(
             topic,
-            channel,
+            CHANNELS[channel],
             {"stamp_ns": self._record.stamp_ns} | columns,
             log_times_ns=self._record.log_time_ns,
             metadata=metadata or {},

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from seamlog.analysis.axis_record import AxisRecord
 from seamlog.analysis.identification.gated import USUAL_DELAY
+from seamlog.analysis.live_controller import LiveController
 from seamlog.contracts import Axis
 from seamlog.errors import EvidenceError
 from seamlog.progress import track
@@ -12,7 +13,6 @@ from seamlog.progress import track
 from .counterfactual import Prediction, make_scene, predict
 from .factories import ControllerChoice, EstimatorChoice, choose_controller, choose_estimator
 from .inputs import ReplayInputs
-from .live import LiveController
 from .model import AxisModel, identify_model
 from .self_check import SelfCheck, check_replay, recorded_choice
 from .settings import Mode, ReplaySettings

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from seamlog.analysis.axis_record import AxisRecord
+from seamlog.analysis.live_controller import LiveController
 from seamlog.contracts import Axis
 from seamlog.errors import UnknownName, UsageError
 
 from .abduction import abduce, reproduce
 from .factories import ControllerChoice, choose_controller
-from .live import LiveController
 from .shadow import shadow_controller
 
 

@@ -1,0 +1,98 @@
+"""`seamlog identify`: inertia and friction of the axis."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from seamlog.command import command, force_option, output_option, session_argument
+from seamlog.outcome import Outcome
+
+if TYPE_CHECKING:
+    from seamlog.results import Part
+
+
+@command("identify")
+@session_argument
+@click.option(
+    "--method",
+    type=click.Choice(["auto", "gated", "idim-ls"]),
+    default="auto",
+    show_default=True,
+    help="By sampling rate; gated for slow loops, idim-ls for fast records.",
+)
+@click.option(
+    "--friction",
+    type=click.Choice(["symmetric", "asymmetric"]),
+    default="symmetric",
+    show_default=True,
+    help="One friction for both directions (and an offset), or one for each.",
+)
+@click.option(
+    "--compare",
+    "reference",
+    type=click.Path(path_type=Path),
+    help="Published values (TOML) to set beside the identified ones.",
+)
+@click.option("--weld", type=int, help="Use only the motion of this weld.")
+@output_option("Results directory to write the part 'identification' to.", required=False)
+@force_option
+def identify(
+    session: Path,
+    method: Any,
+    friction: Any,
+    reference: Path | None,
+    weld: int | None,
+    output: Path | None,
+    force: bool,
+) -> Outcome:
+    """Find inertia, viscous and Coulomb friction and offset of the axis in SESSION.
+
+    Refuses (exit code 6) what the motion cannot tell.
+    """
+    from seamlog.analysis.identification.assess import IdentifyOptions, identify_session
+    from seamlog.analysis.identification.compare import load_reference
+    from seamlog.analysis.welds import chosen_welds
+    from seamlog.files import check_output
+    from seamlog.results import Results
+    from seamlog.session import open_session
+
+    if output is not None:
+        check_output(output / "identification.json", force) if output.is_dir() else None
+    published = load_reference(reference) if reference else None
+    options = IdentifyOptions(method, friction, published, reference)
+    with open_session(session) as opened:
+        place = chosen_welds(opened, weld)[0] if weld is not None else None
+        part, tables = identify_session(opened, place, options)
+    if output is not None:
+        Results.create(output).write(part, tables)
+    source = published.source if published else ""
+    return Outcome("seamlog.identify", text_of(part, source), document_of(part))
+
+
+def document_of(part: "Part") -> dict[str, Any]:
+    """The figures, findings and details, JSON-ready."""
+    return part.model_dump(mode="json", include={"figures", "findings", "details", "reason"})
+
+
+def text_of(part: "Part", source: str) -> str:
+    """A short table for people."""
+    lines = [part.reason]
+    for figure in part.figures:
+        doubt = f" +- {figure.u:.4f}" if figure.u is not None else ""
+        lines.append(f"  {figure.label:<28} {figure.value:12.4f}{doubt} {figure.unit}")
+    rows = part.details["comparison"]
+    if rows:
+        lines += ["", f"against {source}:"]
+        lines.append(f"  {'':<28} {'identified':>12} {'published':>12}  difference")
+    lines += [_comparison(row) for row in rows]
+    lines += [f"  {finding.severity.value}: {finding.message}" for finding in part.findings]
+    return "\n".join(lines)
+
+
+def _comparison(row: dict[str, Any]) -> str:
+    deviation = row["difference_sd"]
+    difference = f"{row['identified'] - row['published']:+.4f}"
+    told = f" ({deviation:+.2f} sd)" if deviation is not None else ""
+    label = row["name"].replace("_", " ")
+    return f"  {label:<28} {row['identified']:12.4f} {row['published']:12.4f}  {difference}{told}"
