@@ -85,7 +85,11 @@ class Session:
 
     @cached_property
     def welds(self) -> list[Weld]:
-        """Arc-on to arc-off, from `/events`."""
+        """Arc-on to arc-off, from `/events`, in log time; of a window those that touch it."""
+        if self.is_window:
+            start, end = self.span
+            whole = Session(self.files, self.limits).welds
+            return [weld for weld in whole if weld.start_ns < end and weld.end_ns > start]
         if self.schema(_EVENTS.topic) != _EVENTS.schema:
             return []
         events = self.columns(_EVENTS.topic, ["kind"])

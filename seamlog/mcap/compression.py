@@ -1,5 +1,7 @@
 """Chunk compression. Decompression counts bytes: no chunk grows beyond the size it declares."""
 
+import threading
+
 import lz4.frame
 import zstandard
 
@@ -10,26 +12,28 @@ ZSTD, LZ4, NONE = "zstd", "lz4", ""
 COMPRESSIONS = (ZSTD, LZ4, NONE)
 _LEVEL = 1
 
-_compressor: zstandard.ZstdCompressor | None = None
+
+class _Zstd(threading.local):
+    """One compressor and one decompressor per thread: making them costs more than a small chunk."""
+
+    def __init__(self) -> None:
+        self.compressor = zstandard.ZstdCompressor(level=_LEVEL)
+        self.decompressor = zstandard.ZstdDecompressor()
+
+
+_zstd = _Zstd()
 
 
 def compress(data: Buffer, compression: str) -> Buffer:
     """`data` as the body of a chunk; `ValueError` for an unknown compression."""
     if compression == ZSTD:
-        return _zstd_compressor().compress(data)
+        return _zstd.compressor.compress(data)
     if compression == LZ4:
         packed: bytes = lz4.frame.compress(data)
         return packed
     if compression == NONE:
         return data
     raise ValueError(f"compression {compression!r} is none of {COMPRESSIONS}")
-
-
-def _zstd_compressor() -> zstandard.ZstdCompressor:
-    global _compressor
-    if _compressor is None:
-        _compressor = zstandard.ZstdCompressor(level=_LEVEL)
-    return _compressor
 
 
 def decompress(data: Buffer, compression: str, size: int, limit: int) -> Buffer:
@@ -51,12 +55,11 @@ def decompress(data: Buffer, compression: str, size: int, limit: int) -> Buffer:
 
 
 def _unzstd(data: Buffer, size: int) -> Buffer:
-    decompressor = zstandard.ZstdDecompressor()
     try:
         declared = zstandard.frame_content_size(data)
         if declared == size:
-            return decompressor.decompress(data, allow_extra_data=False)
-        reader = decompressor.stream_reader(data, read_across_frames=True)
+            return _zstd.decompressor.decompress(data, allow_extra_data=False)
+        reader = _zstd.decompressor.stream_reader(data, read_across_frames=True)
         unpacked = reader.read(size + 1)
     except zstandard.ZstdError as error:
         raise Malformed(f"zstd: {error}") from error

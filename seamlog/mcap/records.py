@@ -264,11 +264,7 @@ class Cursor:
 
     def string(self) -> str:
         """The next string."""
-        data = bytes(self.take(self.u32()))
-        try:
-            return data.decode()
-        except UnicodeDecodeError as error:
-            raise Malformed(f"a string is not UTF-8: {error.reason}") from error
+        return _text(self.take(self.u32()))
 
     def string_map(self) -> dict[str, str]:
         """The next map of strings."""
@@ -285,6 +281,13 @@ class Cursor:
         if len(body) % 10:
             raise Malformed("a map of offsets is no multiple of 10 bytes")
         return dict(struct.iter_unpack("<HQ", body))
+
+
+def _text(data: Buffer) -> str:
+    try:
+        return str(data, "utf-8")
+    except UnicodeDecodeError as error:
+        raise Malformed(f"a string is not UTF-8: {error.reason}") from error
 
 
 _U16, _U32, _U64 = struct.Struct("<H"), struct.Struct("<I"), struct.Struct("<Q")
@@ -320,8 +323,27 @@ def parse_chunk_head(content: Buffer) -> ChunkHead:
     return ChunkHead(start, end, size, crc, compression, cursor.at, data_size)
 
 
+_ONE_CHANNEL = struct.Struct("<QQQQIHQQI")
+_SIZES = struct.Struct("<QQ")
+
+
 def parse_chunk_index(content: Buffer) -> ChunkEntry:
     """A row of the chunk index."""
+    if len(content) >= _ONE_CHANNEL.size:
+        start, end, offset, length, size, channel_id, at, behind, name = _ONE_CHANNEL.unpack_from(
+            content
+        )
+        if size == 10 and len(content) == _ONE_CHANNEL.size + name + _SIZES.size:
+            packed, unpacked = _SIZES.unpack_from(content, _ONE_CHANNEL.size + name)
+            compression = _text(content[_ONE_CHANNEL.size : _ONE_CHANNEL.size + name])
+            places = {channel_id: at}
+            return ChunkEntry(
+                start, end, offset, length, places, behind, compression, packed, unpacked
+            )
+    return _parse_chunk_index(content)
+
+
+def _parse_chunk_index(content: Buffer) -> ChunkEntry:
     cursor = Cursor(content)
     start, end, offset, length = cursor.unpack(_ENTRY)
     offsets = cursor.u16_to_u64()
