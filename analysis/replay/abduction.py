@@ -14,9 +14,10 @@ from scipy import signal
 
 from seamlog.analysis.axis_record import AxisRecord, FloatArray
 from seamlog.analysis.closed_loop import ClosedLoop, Reference, simulate
-from seamlog.analysis.dynamics import Plant, make_plant
+from seamlog.analysis.dynamics import Plant
 from seamlog.contracts import Axis, Controller
 
+from .model import replay_plant
 from .shadow import applied_commands
 
 _PULL_1_S = 0.5
@@ -37,7 +38,7 @@ class Abduction:
 
 def abduce(record: AxisRecord, axis: Axis) -> Abduction:
     """Explain `record` with the plant of `axis`."""
-    plant = make_plant(axis, record.period_s)
+    plant = replay_plant(axis, record.period_s)
     applied = applied_commands(record.command, axis.delay_periods).tolist()
     goal_m = record.position_m.tolist()
     goal_m_s = smooth_speed(record.velocity_m_s).tolist()
@@ -75,6 +76,7 @@ def reproduce(
         axis,
         reference_of(record),
         record.period_s,
+        plant=replay_plant(axis, record.period_s),
         position_noise_m=abduction.position_residual_m,
         velocity_noise_m_s=abduction.velocity_residual_m_s,
         disturbance=abduction.disturbance,

@@ -17,7 +17,8 @@ from seamlog.contracts import Axis, Controller
 
 from .abduction import reference_of, smooth_speed
 from .disturbance import residual_disturbance
-from .model import AxisModel
+from .model import AxisModel, replay_plant
+from .sliding import position_step_m
 
 BAND = (0.05, 0.95)
 _SAVGOL_LEVERAGE = 17 / 35
@@ -60,13 +61,11 @@ class Prediction:
 
 def make_scene(record: AxisRecord, model: AxisModel) -> Scene:
     """Take the measurement's own noise from the record."""
-    steps = np.abs(np.diff(record.position_m))
-    steps = steps[steps > 1e-12]
     rough = record.velocity_m_s - smooth_speed(record.velocity_m_s)
     return Scene(
         record,
         model,
-        position_step_m=float(steps.min()) if len(steps) else 0.0,
+        position_step_m=position_step_m(record),
         velocity_noise_m_s=float(np.std(rough)) / float(np.sqrt(1 - _SAVGOL_LEVERAGE)),
     )
 
@@ -98,6 +97,7 @@ def _run(
         axis,
         reference_of(record),
         record.period_s,
+        plant=replay_plant(axis, record.period_s),
         velocity_noise_m_s=noise,
         disturbance=disturbance,
         encoder_step_m=scene.position_step_m,

@@ -11,12 +11,12 @@ import numpy as np
 from scipy import signal
 
 from seamlog.analysis.axis_record import AxisRecord, FloatArray
+from seamlog.analysis.friction import sliding_friction
 from seamlog.contracts import Axis
 
-from .shadow import applied_commands
+from .sliding import sliding_force
 
 CUTOFF_HZ = 1.0
-GATE_M_S = 0.005
 _BLOCK_S = 1.0
 
 
@@ -40,21 +40,15 @@ class Residual:
 def residual_disturbance(record: AxisRecord, axis: Axis) -> Residual:
     """Residual of `record` against the model of `axis`, positive where it opposes the command."""
     period_s = record.period_s
-    applied = applied_commands(record.command, axis.delay_periods)[:-1]
-    speed = record.velocity_m_s
-    model = (
-        axis.inertia * np.diff(speed) / period_s
-        + axis.viscous_friction * np.diff(record.position_m) / period_s
-        + axis.coulomb_friction * np.sign(speed[1:])
-        + axis.offset
-    )
-    sliding = speed[1:] * speed[:-1] > 0
-    sliding &= np.minimum(np.abs(speed[1:]), np.abs(speed[:-1])) > GATE_M_S
-    rows = np.flatnonzero(sliding)
+    sliding = sliding_force(record, axis)
+    speed = sliding.velocity_m_s
+    friction = np.array([sliding_friction(axis, abs(value)) for value in speed.tolist()])
+    unexplained = sliding.force - np.sign(speed) * friction
+    rows = np.flatnonzero(sliding.rows)
     if not len(rows):
         nothing = np.zeros(len(record))
         return Residual(nothing, nothing, period_s)
-    raw = np.interp(np.arange(len(record)), rows, (applied - model)[rows])
+    raw = np.interp(np.arange(len(record)), rows, unexplained[rows])
     slow = low_pass(raw, period_s)
     return Residual(slow, raw - slow, period_s)
 
