@@ -1,7 +1,9 @@
 """A channel of the live loop: the writer that fits its topic, over a ring of its own."""
 
+import os
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,10 @@ from seamlog.errors import UsageError
 from seamlog.messages import encode, encode_image, is_fixed, layout
 
 from .camera_info import encode_camera_info
-from .fixed import RING_BYTES, Put, fixed_put, fixed_ring, flattened
+from .fixed import RING_BYTES, fixed_put, fixed_ring
 from .folder import OutTray
 from .gate import Gate
+from .put_source import Put, Stop
 from .ring import Ring, create_ring
 from .varying import VaryingWriter
 
@@ -30,45 +33,19 @@ FIRST_CHANNEL_ID = 3
 """Channels 1 and 2 are the recorder's own."""
 
 
+@dataclass(frozen=True, slots=True)
 class Channel:
     """One topic of a recording, owned by the thread that asked for it."""
 
-    __slots__ = ("_clock", "_names", "_put_frame", "gate", "metadata", "put", "stop", "topic")
-
-    def __init__(
-        self, topic: str, metadata: Mapping[str, str], clock: Clock, gate: Gate, writer: "_Writer"
-    ) -> None:
-        self.topic = topic
-        self.metadata = metadata
-        self.gate = gate
-        self.put, self.stop, self._put_frame = writer
-        self._clock = clock
-        self._names = CHANNELS[topic].field_names[1:]
-
-    def log(self, stamp_ns: int | None, fields: Mapping[str, Any]) -> bool:
-        """Log one message by field names; without a stamp, now."""
-        if stamp_ns is None:
-            stamp_ns = self._clock.now_ns()
-        try:
-            values = [fields[name] for name in self._names]
-        except KeyError as missing:
-            return self.gate.refuse(f"field {missing} is missing")
-        if len(values) != len(fields):
-            return self.gate.refuse(plugins.unknown_name("field", *self._stranger(fields)))
-        return self.put(stamp_ns, *values)
-
-    def _stranger(self, fields: Mapping[str, Any]) -> tuple[str, list[str]]:
-        stranger = next(name for name in fields if name not in self._names)
-        return stranger, list(self._names)
-
-    def put_frame(self, stamp_ns: int | None, image: NDArray[Any]) -> bool:
-        """Log a picture that the recorder process is to encode."""
-        if self._put_frame is None:
-            return self.gate.refuse("pictures go to a topic of pictures only")
-        return self._put_frame(self._clock.now_ns() if stamp_ns is None else stamp_ns, image)
-
-
-_Writer = tuple[Put, Put, Put | None]
+    topic: str
+    metadata: Mapping[str, str]
+    put: Put
+    """`put(stamp_ns, *values) -> bool`, values in the table's order."""
+    put_fields: Callable[[int, Mapping[str, Any]], bool]
+    put_frame: Callable[[int, NDArray[Any]], bool]
+    stop: Stop
+    """Take nothing more."""
+    gate: Gate
 
 
 def known_row(topic: str) -> Row:
@@ -95,11 +72,12 @@ def make_channel(
     if is_fixed(row):
         ring = fixed_ring(path, channel_id, layout(topic))
         gate = gate_to(topic, ring)
-        writer = _fixed_writer(row, ring, gate, clock)
+        put, stop = fixed_put(ring, gate, layout(topic), clock)
+        channel = Channel(topic, metadata, put, _by_name(put, gate), _no_pictures(gate), stop, gate)
     else:
         ring = _varying_ring(path, row)
         gate = gate_to(topic, ring)
-        writer = _varying_writer(row, ring, gate, channel_id, clock)
+        channel = _varying_channel(row, metadata, ring, gate, channel_id, clock)
     tray.place(
         {
             "kind": "channel",
@@ -109,7 +87,7 @@ def make_channel(
             "metadata": dict(metadata),
         }
     )
-    return Channel(topic, metadata, clock, gate, writer)
+    return channel
 
 
 def producer_name() -> str:
@@ -118,29 +96,55 @@ def producer_name() -> str:
     return "main" if thread is threading.main_thread() else thread.name
 
 
-def _fixed_writer(row: Row, ring: Ring, gate: Gate, clock: Clock) -> _Writer:
-    form = layout(row.topic)
-    put, stop = fixed_put(ring, gate, form, clock)
-    if any("[" in kind for kind in form.kinds):
-        put = flattened(put, gate, form)
-    return put, stop, None
+def _by_name(put: Put, gate: Gate) -> Callable[[int, Mapping[str, Any]], bool]:
+    """Fields by name for a `put` that takes them as keywords."""
+
+    def put_fields(stamp_ns: int, fields: Mapping[str, Any]) -> bool:
+        try:
+            return put(stamp_ns, **fields)
+        except TypeError:
+            return gate.refuse(f"fields are {_names(gate.topic)}, got {', '.join(fields)}")
+
+    return put_fields
+
+
+def _by_order(put: Put, gate: Gate) -> Callable[[int, Mapping[str, Any]], bool]:
+    """Fields by name for a `put` that takes values in the table's order."""
+    names = CHANNELS[gate.topic].field_names[1:]
+
+    def put_fields(stamp_ns: int, fields: Mapping[str, Any]) -> bool:
+        if set(fields) != set(names):
+            return gate.refuse(f"fields are {_names(gate.topic)}, got {', '.join(fields)}")
+        return put(stamp_ns, *(fields[name] for name in names))
+
+    return put_fields
+
+
+def _names(topic: str) -> str:
+    return ", ".join(CHANNELS[topic].field_names)
+
+
+def _no_pictures(gate: Gate) -> Callable[[int, NDArray[Any]], bool]:
+    return lambda _stamp_ns, _image: gate.refuse("pictures go to a topic of pictures only")
 
 
 def _varying_ring(path: Path, row: Row) -> Ring:
     if row.schema != IMAGE_SCHEMA:
         return create_ring(path, RING_BYTES, 0)
-    from os import statvfs
-
-    facts = statvfs(path.parent)
+    facts = os.statvfs(path.parent)
     plenty = facts.f_bavail * facts.f_frsize >= 4 * _FRAME_RING_BYTES
     return create_ring(path, _FRAME_RING_BYTES if plenty else _SMALL_FRAME_RING_BYTES, 0)
 
 
-def _varying_writer(row: Row, ring: Ring, gate: Gate, channel_id: int, clock: Clock) -> _Writer:
+def _varying_channel(
+    row: Row, metadata: Mapping[str, str], ring: Ring, gate: Gate, channel_id: int, clock: Clock
+) -> Channel:
     is_picture = row.schema == IMAGE_SCHEMA
     share = _FRAME_SHARE if is_picture else 1.0
     writer = VaryingWriter(ring, gate, channel_id, clock, _encoder(row), share)
-    return writer.put, writer.stop, writer.put_frame if is_picture else None
+    put_frame = writer.put_frame if is_picture else _no_pictures(gate)
+    named = _by_order(writer.put, gate)
+    return Channel(row.topic, metadata, writer.put, named, put_frame, writer.stop, gate)
 
 
 def _encoder(row: Row) -> Callable[..., bytes]:

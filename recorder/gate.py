@@ -3,7 +3,9 @@
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
+from seamlog.channels import CHANNELS
 from seamlog.errors import RecordingError
 
 from .ring import (
@@ -40,6 +42,15 @@ class Gate:
         self._is_alive = is_alive
         self._foreign = threading.Lock()
 
+    def new_limit(self, number: int) -> int:
+        """How many messages a fixed ring has room for in all, -1 after the end.
+
+        Waits for room for message `number` where the source is simulated.
+        """
+        words, slots = self.ring.words, self.ring.slots
+        self.has_room(lambda: number < words[TAIL] + slots)
+        return int(words[TAIL]) + slots if self.is_open else -1
+
     def has_room(self, fits: Callable[[], bool]) -> bool:
         """True once `fits` is; waits for it where the source is simulated."""
         if not self.is_open:
@@ -72,6 +83,12 @@ class Gate:
         self.ring.words[REFUSED] += 1
         return self._complain(reason)
 
+    def refuse_values(self, values: tuple[Any, ...], error: Exception | str) -> bool:
+        """Refuse a message whose `values`, the stamp first, cannot be packed."""
+        wanted = ", ".join(CHANNELS[self.topic].field_names)
+        got = ", ".join(_short(value) for value in values)
+        return self.refuse(f"put({wanted}) cannot take ({got}): {error}")
+
     def refuse_closed(self) -> bool:
         """A message after the end of the recording."""
         return self._complain("the recording is closed")
@@ -91,3 +108,11 @@ class Gate:
         if self.strict:
             raise RecordingError(f"{self.topic}: message not recorded: {reason}")
         return False
+
+
+def _short(value: Any) -> str:
+    try:
+        text = repr(value)
+    except Exception:  # noqa: BLE001 - it is the caller's object
+        text = f"<{type(value).__name__}>"
+    return text if len(text) <= 40 else text[:37] + "..."

@@ -3,12 +3,12 @@
 import logging
 import os
 import sys
-import threading
 import time
 import uuid
 import weakref
 from collections.abc import Mapping
 from pathlib import Path
+from threading import get_ident
 from types import TracebackType
 from typing import Any, Self
 
@@ -86,7 +86,7 @@ class Recorder:
         an unknown topic, a closed recorder or other metadata than before; `SpaceMissing` if
         there is too little shared memory.
         """
-        key = (topic, threading.get_ident())
+        key = (topic, get_ident())
         found = self._channels.get(key)
         if found is None:
             return self._make_channel(key, metadata or {})
@@ -97,16 +97,20 @@ class Recorder:
 
     def log(self, topic: str, stamp_ns: int | None = None, **fields: Any) -> bool:
         """Log one message by field names; False if it was not accepted."""
-        channel = self._channels.get((topic, threading.get_ident())) or self._late_channel(topic)
-        return channel.log(stamp_ns, fields) if channel else self._turn_away(topic)
+        channel = self._channels.get((topic, get_ident())) or self._late_channel(topic)
+        if channel is None:
+            return self._turn_away(topic)
+        return channel.put_fields(self.clock.now_ns() if stamp_ns is None else stamp_ns, fields)
 
     def log_frame(self, topic: str, image: NDArray[Any], stamp_ns: int | None = None) -> bool:
         """Log a picture, uint8, shape (rows, columns) grey or (rows, columns, 3) BGR.
 
         The loop pays one copy; the recorder process makes a JPEG of it.
         """
-        channel = self._channels.get((topic, threading.get_ident())) or self._late_channel(topic)
-        return channel.put_frame(stamp_ns, image) if channel else self._turn_away(topic)
+        channel = self._channels.get((topic, get_ident())) or self._late_channel(topic)
+        if channel is None:
+            return self._turn_away(topic)
+        return channel.put_frame(self.clock.now_ns() if stamp_ns is None else stamp_ns, image)
 
     def attach(self, name: str, data: bytes, media_type: str) -> None:
         """Put a file into the session, at most `LIMITS.attachment_bytes`."""
@@ -193,12 +197,13 @@ class Recorder:
             raise UsageError(f"the recording of {self.path} is closed")
 
     def _stop_channels(self) -> None:
-        mine = threading.get_ident()
-        for channel in self._channels.values():
-            channel.stop()
-        if any(channel.gate.owner != mine for channel in self._channels.values()):
+        mine = get_ident()
+        channels = list(self._channels.values())
+        _stop(channels)
+        if any(channel.gate.owner != mine for channel in channels):
             # A put of another thread may be between its check and its last store.
             time.sleep(2 * sys.getswitchinterval())
+            _stop(channels)
 
     def _findings(self) -> tuple[str, ...]:
         return tuple(f"{topic}: {why}" for topic, why in self._strangers.items())
@@ -224,9 +229,14 @@ class Recorder:
     def _leave(self) -> None:
         """In a forked child: take no part in the recording."""
         self._final = Status(self.id, str(self.path), False, (), ("forked",))
-        for channel in self._channels.values():
-            channel.stop()
+        _stop(list(self._channels.values()))
         self._process.leave()
+
+
+def _stop(channels: list[Channel]) -> None:
+    for channel in channels:
+        channel.gate.is_open = False
+        channel.stop()
 
 
 def _describe(

@@ -86,10 +86,8 @@ class VaryingWriter:
         np.copyto(place.reshape(image.shape), image)
         return self._publish(at, len(head) + image.size)
 
-    def stop(self) -> bool:
-        """Take nothing more."""
-        self._gate.is_open = False
-        return True
+    def stop(self) -> None:
+        """Take nothing more; the gate is closed already."""
 
     def _sequence(self) -> int:
         return (self._accepted + self._gaps) % _SEQUENCES
