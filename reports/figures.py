@@ -4,18 +4,21 @@ Each pixel column of a curve keeps its first, lowest, highest and last value (M4
 lost. Colours are classes; the style sheet gives them their light and dark values.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .content import Histogram, Plot, Series
+from .content import Column, Histogram, Plot, Series
 from .numbers import format_quantity
 from .ticks import axis_ticks, padded
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66, 14, 12, 44
 _POINTS_PER_CURVE = 1600
+BAND_REACH = 0.5
+"""How far a band may stretch the y axis beyond the values, in spans of the values."""
 _MOST_RUNS = 200
 """Pieces between gaps that are drawn as curves; with more, each pixel column shows its extent."""
 
@@ -98,7 +101,8 @@ def draw_plot(plot: Plot) -> Drawing:
     shapes: list[Shape] = []
     for number, series in enumerate(plot.series, 1):
         if series.low is not None and series.high is not None:
-            area = _area(x, series.low.values, series.high.values, across, up)
+            low, high = (np.clip(e.values, up.low, up.high) for e in (series.low, series.high))
+            area = _area(x, low, high, across, up)
             shapes.append(Shape(area, f"band c{number}"))
     for limit in plot.limits:
         y = up.px(limit.value)
@@ -106,6 +110,7 @@ def draw_plot(plot: Plot) -> Drawing:
     shapes += [
         Shape(f"M{across.px(mark.x):.1f} {box.top}V{box.bottom}", "mark", mark.label)
         for mark in plot.marks
+        if across.low <= mark.x <= across.high
     ]
     for number, series in enumerate(plot.series, 1):
         curve = _curve(x, series.values.values, across, up, series.step)
@@ -158,12 +163,26 @@ def _x_range(x: NDArray[Any]) -> tuple[float, float]:
 
 
 def _y_range(plot: Plot) -> tuple[float, float]:
+    """The values, the limits, and as much of the bands as leaves the curves readable."""
+    values = _extent(series.values for series in plot.series)
+    edges = _extent(edge for s in plot.series for edge in (s.low, s.high) if edge is not None)
     seen = [limit.value for limit in plot.limits]
-    for series in plot.series:
-        for column in (series.values, series.low, series.high):
-            if column is not None and np.isfinite(column.values).any():
-                seen += [float(np.nanmin(column.values)), float(np.nanmax(column.values))]
+    if values is not None:
+        low, high = values
+        if edges is not None:
+            reach = BAND_REACH * (high - low) or float("inf")
+            low = min(low, max(edges[0], low - reach))
+            high = max(high, min(edges[1], high + reach))
+        seen += [low, high]
     return padded(min(seen), max(seen)) if seen else (0.0, 1.0)
+
+
+def _extent(columns: Iterable[Column]) -> tuple[float, float] | None:
+    known = [c.values[np.isfinite(c.values)] for c in columns]
+    known = [values for values in known if values.size]
+    if not known:
+        return None
+    return min(float(v.min()) for v in known), max(float(v.max()) for v in known)
 
 
 def _runs(y: NDArray[Any]) -> list[tuple[int, int]]:

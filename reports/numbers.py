@@ -48,7 +48,7 @@ def format_quantity(value: float | str, u: float | None = None, unit: str = "") 
 
 def quantity(value: float | str, u: float | None = None, unit: str = "") -> Quantity:
     """`value` with as many digits as U = 2 u allows."""
-    spelled = "" if unit == "1" else _spelled(unit)
+    spelled = "" if unit == "1" else spelled_unit(unit)
     if isinstance(value, str):
         return Quantity(value, unit=spelled)
     if not math.isfinite(value):
@@ -99,5 +99,6 @@ def _significant(value: float) -> str:
 _SPELLED = {"um": "µm", "Ohm": "Ω", "deg": "°", "percent": "%"}
 
 
-def _spelled(unit: str) -> str:
-    return _SPELLED.get(unit, unit).replace("^2", "²").replace("^3", "³").replace("mm2", "mm²")
+def spelled_unit(unit: str) -> str:
+    """A unit as it is printed."""
+    return _SPELLED.get(unit, unit).replace("^2", "²").replace("^3", "³")

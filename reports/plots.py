@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from seamlog.results import Part
 
 from .content import Column, Limit, Mark, SeamPlot, Series, TimePlot
-from .numbers import COVERAGE
+from .numbers import COVERAGE, spelled_unit
 from .run import Run
 
 Columns = dict[str, NDArray[Any]]
@@ -33,6 +33,7 @@ _SUFFIXES = {
     "m_min": "m/min",
 }
 """Endings of names that are units, longest match first."""
+_LONGEST_LABEL = 32
 _STRIPS = 3
 """From this many plots of one table on, they are drawn as low strips."""
 
@@ -80,7 +81,7 @@ def make_plot(
         "title": title or f"{words[:1].upper()}{words[1:]}",
         "caption": caption,
         "x": Column(values=x),
-        "y_label": _axis_label(words if len(words) < 40 else table, series[0].unit),
+        "y_label": _axis_label("" if compact else words, series[0].unit),
         "series": series,
         "limits": list(limits),
         "compact": compact,
@@ -111,7 +112,7 @@ def _series(name: str, units: dict[str, str], columns: Columns, single: bool) ->
     low, high, band = _band(name, columns, single)
     return Series(
         label=label,
-        unit=units.get(name) or guessed,
+        unit=spelled_unit(units.get(name) or guessed),
         values=Column(values=columns[name].astype(np.float64)),
         low=None if low is None else Column(values=low),
         high=None if high is None else Column(values=high),
@@ -148,7 +149,8 @@ def _by_unit(columns: Columns, units: dict[str, str]) -> list[list[str]]:
 
 
 def _axis_label(words: str, unit: str) -> str:
-    return f"{words} [{unit}]" if unit and unit != "1" else words
+    shown = f"[{unit}]" if unit and unit != "1" else ""
+    return f"{words[:_LONGEST_LABEL]} {shown}".strip()
 
 
 def _marks(part: Part, axis: str) -> list[Mark]:

@@ -7,6 +7,7 @@ report.write(Path("report.html"))
 """
 
 import hashlib
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -92,13 +93,18 @@ class Report:
         kinds = dict.fromkeys(p.part for run in self._runs for p in run.parts)
         return [
             Section(
-                name=kind,
+                name=_anchor(kind),
                 title=kind.replace("_", " ").capitalize(),
                 blocks=[b for run in self._runs for p in run.of(kind) for b in part_blocks(run, p)],
             )
             for kind in kinds
             if kind not in claimed
         ]
+
+
+def _anchor(name: str) -> str:
+    """A name that can stand in an address: letters, digits, hyphens."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-") or "part"
 
 
 def _links(run: Run) -> list[Link]:

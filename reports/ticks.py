@@ -5,6 +5,8 @@ import math
 from .numbers import decimals_for, format_number
 
 _ROUND = (1.0, 2.0, 2.5, 5.0, 10.0)
+_FINER = 0.65
+"""Rather more ticks than wanted than too few."""
 
 
 def axis_ticks(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
@@ -23,4 +25,4 @@ def padded(low: float, high: float, fraction: float = 0.06) -> tuple[float, floa
 
 def _round_step(rough: float) -> float:
     power = 10.0 ** math.floor(math.log10(rough))
-    return next(power * nice for nice in _ROUND if power * nice >= rough * (1 - 1e-9))
+    return next(power * nice for nice in _ROUND if power * nice >= _FINER * rough)

@@ -31,9 +31,7 @@ async function makePhoto(figure, spec, read, bus) {
   };
 
   figure.querySelector(".stage").addEventListener("pointermove", (event) => {
-    const box = marker.getBoundingClientRect();
-    const px = ((event.clientX - box.left) / box.width) * spec.width_px;
-    const py = ((event.clientY - box.top) / box.height) * spec.height_px;
+    const { x: px, y: py } = new DOMPoint(event.clientX, event.clientY).matrixTransform(marker.getScreenCTM().inverse());
     let best = null, least = Infinity;
     for (const i of known) {
       const away = ((leftX[i] + rightX[i]) / 2 - px) ** 2 + ((leftY[i] + rightY[i]) / 2 - py) ** 2;

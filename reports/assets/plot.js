@@ -22,7 +22,7 @@ function seriesOf(spec) {
     places.push(list.length);
     list.push({ label: series.label, stroke, width: 1.5, paths, points, spanGaps: false });
     if (series.low && series.high) {
-      const edge = { stroke: "transparent", width: 0, points };
+      const edge = { stroke: "transparent", width: 0, points, auto: false };
       list.push({ ...edge, label: "high" }, { ...edge, label: "low" });
       bands.push({ series: [list.length - 2, list.length - 1], fill: () => colour(`--band${i + 1}`) });
     }
@@ -68,10 +68,32 @@ function drawLines(u, spec) {
   ctx.restore();
 }
 
-/* Range of y: the values in view and the limits, with some air. */
-function rangeOf(spec) {
-  return (_, low, high) => {
+/* How far a band may stretch the y axis beyond the values, in spans of the values. */
+const BAND_REACH = 0.5;
+
+/* Lowest and highest value in view of the columns, [Infinity, -Infinity] if there is none. */
+function extentOf(u, columns) {
+  const [first, last] = u.series[0].idxs;
+  let low = Infinity, high = -Infinity;
+  for (const column of columns) {
+    for (let i = first; i <= last; i++) {
+      const value = column[i];
+      if (value === null || value === undefined) continue;
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+  }
+  return [low, high];
+}
+
+/* Range of y: the values in view, the limits, and bands as far as curves stay readable. */
+function rangeOf(spec, bands) {
+  return (u, low, high) => {
     let bottom = low ?? Infinity, top = high ?? -Infinity;
+    const reach = BAND_REACH * (top - bottom) || Infinity;
+    const edges = extentOf(u, bands.flatMap((band) => band.series).map((i) => u.data[i]));
+    bottom = Math.min(bottom, Math.max(edges[0], bottom - reach));
+    top = Math.max(top, Math.min(edges[1], top + reach));
     for (const limit of spec.limits) { bottom = Math.min(bottom, limit.value); top = Math.max(top, limit.value); }
     if (!(top >= bottom)) return [0, 1];
     const air = 0.06 * (top - bottom || Math.abs(top) || 1);
@@ -101,7 +123,7 @@ async function makePlot(figure, spec, read, bus) {
     width: Math.max(box.clientWidth, 280), height, series: list, bands,
     legend: { show: false },
     padding: [8, 12, 0, 0],
-    scales: { x: { time: false }, y: { range: rangeOf(spec) } },
+    scales: { x: { time: false }, y: { range: rangeOf(spec, bands) } },
     axes: [axisOf(`${spec.x_label} [${spec.x_unit}]`, { size: 30 }), axisOf(spec.y_label, { size: 52 })],
     cursor: { y: false, drag: { x: true, y: false, setScale: true }, bind: { mouseleave: () => null } },
     hooks: {

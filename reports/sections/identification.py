@@ -1,12 +1,13 @@
 """What the axis is made of: inertia and friction with uncertainty, and how the estimates came."""
 
 from collections.abc import Sequence
+from typing import Any
 
-from seamlog.reports.content import AnyBlock
+from seamlog.reports.content import AnyBlock, Table
 from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots
 from seamlog.reports.run import Run
 from seamlog.reports.verdicts import statement
-from seamlog.results import Part
+from seamlog.results import Figure, Part
 
 
 def section(runs: Sequence[Run]) -> list[AnyBlock]:
@@ -18,8 +19,37 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
     return [
         statement(part),
         *figures(part),
+        *_comparison(part),
         *findings(run, part),
         *plots(run, part),
         *pictures(run, part),
         *criteria(run, part),
     ]
+
+
+def _comparison(part: Part) -> list[AnyBlock]:
+    """The identified values beside published ones, where the part was compared."""
+    rows = part.details.get("comparison")
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows) or not rows:
+        return []
+    units = {figure.name: figure.unit for figure in part.figures}
+    header = ["Parameter", "identified", "published", "difference in standard deviations"]
+    return [
+        Table(
+            caption="Identified and published values (± U, k = 2)",
+            header=header,
+            rows=[_row(row, units.get(str(row.get("name")), "")) for row in rows],
+        )
+    ]
+
+
+def _row(row: dict[str, Any], unit: str) -> tuple[str, list[Figure | None]]:
+    name = str(row.get("name"))
+    cells: list[Figure | None] = [
+        Figure(name=name, label=kind, value=row.get(kind), u=row.get(f"{kind}_sd"), unit=unit)
+        for kind in ("identified", "published")
+    ]
+    difference = row.get("difference_sd")
+    label = "difference over the joint standard deviation"
+    shown = Figure(name=name, label=label, value=difference) if difference is not None else None
+    return name.replace("_", " "), [*cells, shown]

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 
 from seamlog.reports.content import AnyBlock, Fact, FactTable
 from seamlog.reports.run import Run
+from seamlog.results import Part
 
 
 def section(runs: Sequence[Run]) -> list[AnyBlock]:
-    """Inputs, the versions that made the parts, and the configuration of each."""
+    """Inputs, and for each part the version that made it and its settings."""
     blocks: list[AnyBlock] = []
     for run in runs:
         blocks.append(FactTable(caption=f"Inputs of {run.label}", facts=_inputs(run)))
-        blocks.append(FactTable(caption=f"Parts of {run.label}", facts=_versions(run)))
-        blocks.append(FactTable(caption=f"Configuration of {run.label}", facts=_settings(run)))
+        blocks.append(FactTable(caption=f"Parts of {run.label}", facts=_parts(run)))
     return blocks
 
 
@@ -26,21 +26,12 @@ def _inputs(run: Run) -> list[Fact]:
     return facts or [Fact(label="Inputs")]
 
 
-def _versions(run: Run) -> list[Fact]:
-    return [
-        Fact(
-            label=part.stem,
-            value=f"seamlog {part.seamlog_version}" if part.seamlog_version else None,
-        )
-        for part in run.parts
-    ]
+def _parts(run: Run) -> list[Fact]:
+    return [Fact(label=part.stem, value=_made(part)) for part in run.parts]
 
 
-def _settings(run: Run) -> list[Fact]:
-    return [
-        Fact(
-            label=part.stem,
-            value=json.dumps(part.configuration, sort_keys=True) if part.configuration else None,
-        )
-        for part in run.parts
-    ]
+def _made(part: Part) -> str:
+    version = f"seamlog {part.seamlog_version}" if part.seamlog_version else "version not recorded"
+    if not part.configuration:
+        return f"{version}, no settings stated"
+    return f"{version}, settings {json.dumps(part.configuration, sort_keys=True)}"

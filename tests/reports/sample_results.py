@@ -133,6 +133,7 @@ def _write_identification(results: Results, random: np.random.Generator) -> None
         "inertia": 1.02 * settle + random.normal(0, 0.01, t.size),
         "viscous_friction": 2.14 * settle + random.normal(0, 0.02, t.size),
         "coulomb_friction": 0.214 * settle + random.normal(0, 0.004, t.size),
+        "u_inertia": 0.02 + 30 * np.exp(-t / 0.3),
     }
     units = {"inertia": "N s^2/m", "viscous_friction": "N s/m", "coulomb_friction": "N"}
     gap = np.where((t > 8) & (t < 9), np.nan, random.normal(0, 0.02, t.size))
@@ -157,6 +158,18 @@ def _write_identification(results: Results, random: np.random.Generator) -> None
                     reason="the motion is symmetric: offset cannot be told from gravity",
                 ),
             ],
+            details={
+                "comparison": [
+                    {
+                        "name": "inertia",
+                        "identified": 1.0213,
+                        "identified_sd": 0.0041,
+                        "published": 1.0,
+                        "published_sd": None,
+                        "difference_sd": 5.2,
+                    }
+                ]
+            },
         ),
         tables={"estimator": (estimator, units), "residual": (residual, {"residual": "N"})},
     )
@@ -167,14 +180,15 @@ def _write_replay(results: Results, weld: dict[str, Floats], random: np.random.G
     tables, figures = {}, []
     for name, size in (("recorded", 1.0), ("paper", 0.9), ("pd", 2.4)):
         error = size * weld["error"] + random.normal(0, 0.02, weld["t"].size)
-        columns = {"stamp_ns": stamp_ns, "error_mm": error}
+        command = size * weld["command"]
+        columns = {"stamp_ns": stamp_ns, "error_mm": error, "command": command}
         if name != "recorded":
             columns |= {"band_low_mm": error - 0.1, "band_high_mm": error + 0.1}
-        tables[name] = (columns, dict.fromkeys(list(columns)[1:], "mm"))
+        tables[name] = (columns, dict.fromkeys(list(columns)[1:], "mm") | {"command": "N"})
         rms, peak = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
         figures += [
-            _figure(f"{name}_rms_mm", f"{name}: error, rms", rms, "mm", 0.01),
-            _figure(f"{name}_peak_mm", f"{name}: error, peak", peak, "mm", 0.03),
+            _figure(f"{name}_rms_error_mm", f"rms tracking error, {name}", rms, "mm", 0.01),
+            _figure(f"{name}_peak_error_mm", f"peak tracking error, {name}", peak, "mm", 0.03),
         ]
     results.write(
         Part(part="replay", title="Replay", inputs=[SESSION], figures=figures), tables=tables
