@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 MARKER = "/robot/marker"
 CALIBRATION = "calibration/table_from_camera.json"
 HALF_WINDOW_S = 0.6
-_FEWEST = 7
+_FEWEST = 12
 _ROUNDS = 3
 
 
@@ -50,8 +50,8 @@ class TorchPath:
     def stamp_at(self, s_mm: FloatArray) -> NDArray[np.int64]:
         """Stamps at which the torch passed `s_mm` (clamped to the weld)."""
         since = (self.stamp_ns - self.stamp_ns[0]).astype(np.float64)
-        passed = np.interp(s_mm, self.s_mm, since)
-        return self.stamp_ns[0] + np.rint(passed).astype(np.int64)
+        passed = np.rint(np.interp(s_mm, self.s_mm, since)).astype(np.int64)
+        return np.asarray(self.stamp_ns[0] + passed, dtype=np.int64)
 
 
 def torch_path(session: "Session", weld: "Weld") -> TorchPath:
@@ -89,8 +89,8 @@ def path_of(
     """Smooth positions of shape (n, 2) against the plate and measure along them."""
     inside = (stamp_ns > ends_ns[0]) & (stamp_ns < ends_ns[1])
     grid_ns = np.concatenate([[ends_ns[0]], stamp_ns[inside], [ends_ns[1]]])
-    seconds = (stamp_ns - ends_ns[0]) * 1e-9
-    grid_s = (grid_ns - ends_ns[0]) * 1e-9
+    seconds = np.asarray((stamp_ns - ends_ns[0]) * 1e-9, dtype=np.float64)
+    grid_s = np.asarray((grid_ns - ends_ns[0]) * 1e-9, dtype=np.float64)
     x = _smooth(seconds, plate_mm[:, 0], grid_s)
     y = _smooth(seconds, plate_mm[:, 1], grid_s)
     chords = np.hypot(np.diff(x.value), np.diff(y.value))

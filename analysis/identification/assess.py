@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from seamlog.analysis.axis_record import AxisRecord, load_axis_record
 from seamlog.analysis.live_controller import live_controller
+from seamlog.analysis.part_tables import Tables
 from seamlog.errors import EvidenceError
 from seamlog.results import Part, input_of
 
@@ -14,7 +15,7 @@ from .excitation import judge_excitation
 from .gated import USUAL_DELAY
 from .identify import Method, identify_axis
 from .method import Friction
-from .part import Tables, estimator_table, identification_part, refused_part
+from .part import estimator_table, identification_part, refused_part
 
 if TYPE_CHECKING:
     from seamlog.session import Session

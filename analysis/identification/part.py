@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seamlog.analysis.part_tables import Tables
 from seamlog.results import Figure, Finding, Input, Part, Severity
 
 from .compare import Comparison
 from .excitation import Excitation
 from .method import SYMMETRIC, Identification, unit_of
 
-Tables = dict[str, tuple[Mapping[str, NDArray[Any]], Mapping[str, str]]]
 Columns = Mapping[str, NDArray[Any]]
 _PARAMETERS = ("inertia", "viscous_friction", "coulomb_friction")
 

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.analysis.axis_record import AxisRecord, FloatArray
+from seamlog.analysis.part_tables import Tables
 from seamlog.results import Figure, Finding, Input, Part, Severity
 from seamlog.welds import Weld
 
 from .counterfactual import Prediction
 from .run import ControllerRun, Replay
 from .settings import ReplaySettings
-from .tables import Tables, replay_tables
+from .tables import replay_tables
 
 TOLERANCE = 1e-9
 """Largest difference of commands, relative to the largest command, that counts as reproduced."""

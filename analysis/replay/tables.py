@@ -1,16 +1,15 @@
 """The tables of a replay: one per run, over the same stamps."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.analysis.axis_record import AxisRecord
+from seamlog.analysis.part_tables import Tables
 
 from .run import ControllerRun, EstimatorRun, Replay
 
-Tables = dict[str, tuple[Mapping[str, NDArray[Any]], Mapping[str, str]]]
 _PARAMETERS = ("inertia", "viscous_friction", "coulomb_friction")
 
 
