@@ -20,7 +20,7 @@ class PaperConfig(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    surface_slope: float = Field(4.0, gt=0)
+    surface_slope: float = Field(3.5, gt=0)
     """lambda, 1/s."""
     gain: float | None = Field(None, ge=0)
     """K, command unit; None: the larger of static and Coulomb friction, as eq. 5 requires."""
