@@ -5,8 +5,8 @@ acts `axis.delay_periods` later, over the period [k + delay, k + delay + 1]; bef
 command arrives, `initial_command` acts.
 """
 
-import math
 from dataclasses import dataclass
+from math import floor
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,7 +73,8 @@ def simulate(
     """
     count = reference.position_m.shape[0]
     plant = plant or make_plant(axis, period_s)
-    step, output, limit = plant.step, controller.output, axis.saturation
+    step, output, state = plant.step, controller.output, controller.state
+    limit = axis.saturation
     asked_m = reference.position_m.tolist()
     asked_m_s = reference.velocity_m_s.tolist()
     asked_m_s2 = reference.acceleration_m_s2.tolist()
@@ -85,14 +86,16 @@ def simulate(
     rows: list[tuple[float, float, float, float, float, float, float]] = []
     states = []
     for k in range(count):
-        seen_m = _quantised(position, encoder_step_m) + noise_m[k]
+        seen_m = noise_m[k] + (
+            floor(position / encoder_step_m + 0.5) * encoder_step_m if encoder_step_m else position
+        )
         seen_m_s = velocity + noise_m_s[k]
         wanted = output(asked_m[k], asked_m_s[k], asked_m_s2[k], seen_m, seen_m_s)
         command = limit if wanted > limit else -limit if wanted < -limit else wanted
         waiting.append(command)
         applied = waiting.pop(0)
         rows.append((position, velocity, seen_m, seen_m_s, command, applied, wanted))
-        states.append(controller.state())
+        states.append(state())
         position, velocity = step(position, velocity, applied, load[k])
     columns = np.array(rows, dtype=np.float64).reshape(count, 7).T
     return ClosedLoop(
@@ -102,16 +105,10 @@ def simulate(
         measured_velocity_m_s=columns[3],
         command=columns[4],
         applied_command=columns[5],
-        saturated=columns[4] != columns[6],
+        saturated=np.abs(columns[6]) > limit,
         states=np.array(states, dtype=np.float64).reshape(count, -1),
     )
 
 
 def _series(values: ArrayLike, count: int) -> list[float]:
     return list(np.broadcast_to(np.asarray(values, dtype=np.float64), (count,)).tolist())
-
-
-def _quantised(position_m: float, encoder_step_m: float) -> float:
-    if encoder_step_m <= 0.0:
-        return position_m
-    return math.floor(position_m / encoder_step_m + 0.5) * encoder_step_m

@@ -89,12 +89,12 @@ _LOG_SIXTEENTHS = (
 
 
 def arctangent(x: float) -> float:
-    """Angle whose tangent is `x`, rad."""
+    """Angle whose tangent is `x`, rad; NaN stays NaN."""
     if x < 0.0:
         return -arctangent(-x)
     if x > 1.0:
         return _HALF_PI - _arctangent_to_one(1.0 / x)
-    return _arctangent_to_one(x)
+    return _arctangent_to_one(x) if x <= 1.0 else x
 
 
 def _arctangent_to_one(x: float) -> float:
@@ -109,9 +109,9 @@ def _arctangent_to_one(x: float) -> float:
 
 
 def exponential(x: float) -> float:
-    """E to the power `x`; 0 below -745, `OverflowError` above 709."""
-    if x < -745.0:
-        return 0.0
+    """E to the power `x`; 0 below -745, `OverflowError` above 709; NaN stays NaN."""
+    if not x >= -745.0:
+        return 0.0 if x < 0.0 else x
     steps = math.floor(x * _STEPS_PER_LN2 + 0.5)
     rest = (x - steps * _STEP_HIGH) - steps * _STEP_LOW
     series = 1 / 24 + rest * (1 / 120 + rest * (1 / 720))

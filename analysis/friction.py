@@ -12,6 +12,10 @@ _TWO_OVER_PI = 0.6366197723675814
 def friction_shape(velocity_m_s: float, dead_zone_m_s: float) -> float:
     """Eq. 3 without C and b: (2/pi) atan((v/alpha)^9), dimensionless, in (-1, 1)."""
     ratio = velocity_m_s / dead_zone_m_s
+    if ratio > 100.0:
+        return 1.0
+    if ratio < -100.0:
+        return -1.0
     cube = ratio * ratio * ratio
     return _TWO_OVER_PI * arctangent(cube * cube * cube)
 

@@ -52,7 +52,10 @@ class PaperController:
         self._config, self._axis, self._period_s = config, axis, period_s
         static = max(axis.static_friction, axis.coulomb_friction)
         self._gain = static if config.gain is None else config.gain
-        self._rate_factor = config.surface_slope * (2.0 if config.form == "right" else 1.0)
+        self._slope, self._layer = config.surface_slope, config.boundary_layer
+        self._dead_zone_m_s = config.dead_zone_m_s
+        self._damping = config.surface_slope * (2.0 if config.form == "right" else 1.0)
+        self._stiffness = config.surface_slope * config.surface_slope
         self._on_reference = config.friction_speed == "reference"
         self._state = (0.0,) * 6
         self.adapt(axis.inertia, axis.viscous_friction, axis.coulomb_friction)
@@ -72,16 +75,14 @@ class PaperController:
         velocity_m_s: float,
     ) -> float:
         """Eq. 12, before saturation."""
-        config = self._config
-        slope = config.surface_slope
         error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
-        approach = error_m_s + slope * error_m
+        approach = error_m_s + self._slope * error_m
         speed = reference_m_s if self._on_reference else velocity_m_s
         friction = self._viscous * speed
-        friction += self._coulomb * friction_shape(speed, config.dead_zone_m_s)
-        tracking = reference_m_s2 + self._rate_factor * error_m_s + slope * slope * error_m
-        tracking *= self._inertia
-        ratio = approach / config.boundary_layer
+        friction += self._coulomb * friction_shape(speed, self._dead_zone_m_s)
+        wanted_m_s2 = reference_m_s2 + self._damping * error_m_s + self._stiffness * error_m
+        tracking = self._inertia * wanted_m_s2
+        ratio = approach / self._layer
         switching = self._switching * (1.0 if ratio > 1.0 else -1.0 if ratio < -1.0 else ratio)
         self._state = (-approach, error_m, error_m_s, friction, tracking, switching)
         return friction + tracking + switching

@@ -25,7 +25,7 @@ CONTROLLER = AdaptiveConfig(
         surface_slope=4.0,
         gain=9.0,
         boundary_layer=0.12,
-        dead_zone_m_s=0.0005,
+        dead_zone_m_s=0.0001,
         friction_speed="reference",
     ),
     estimator=GatedRLSConfig(
