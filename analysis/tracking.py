@@ -44,7 +44,8 @@ def tracking_parts(
     record = load_axis_record(session)
     inputs = [input_of(path) for path in session.paths]
     if not record.has_reference:
-        return [(_no_reference(inputs), {})]
+        reason = "the session has no /table/reference: without it there is no tracking error"
+        return [(unknown_tracking(reason, inputs), {})]
     if not welds:
         return [_tracking(record, None, None, "the session has no weld", limits, inputs)]
     parts = []
@@ -62,8 +63,8 @@ def _torch(session: "Session", weld: "Weld") -> tuple[TorchPath | None, str]:
         return None, str(error)
 
 
-def _no_reference(inputs: list[Input]) -> Part:
-    reason = "the session has no /table/reference: without it there is no tracking error"
+def unknown_tracking(reason: str, inputs: list[Input]) -> Part:
+    """The part of a session that cannot tell how well it tracked."""
     none = Figure(name="rms_error_mm", label="rms tracking error", value=None, reason=reason)
     return Part(part="tracking", title="Tracking", reason=reason, inputs=inputs, figures=[none])
 
