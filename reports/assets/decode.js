@@ -1,4 +1,4 @@
-/* Columns from the data block: base64, gzip, bytes sorted by weight, differences. */
+/* Columns from the data block: base64, gzip, bytes by weight, differences. */
 
 async function inflate(text) {
   const packed = atob(text);
@@ -10,14 +10,14 @@ async function inflate(text) {
 
 /* A column as numbers; null where there is no value. */
 async function decodeColumn(coded) {
-  const { n, decimals, offset, delta } = coded;
+  const { n, decimals, offset } = coded;
   const bytes = await inflate(coded.data);
   const values = new Float64Array(n);
   const scale = 10 ** Math.abs(decimals);
   let tick = 0;
   for (let i = 0; i < n; i++) {
     const word = bytes[i] | (bytes[n + i] << 8) | (bytes[2 * n + i] << 16) | (bytes[3 * n + i] << 24);
-    tick = delta ? (tick + word) | 0 : word;
+    tick = (tick + ((word >>> 1) ^ -(word & 1))) | 0;
     values[i] = decimals >= 0 ? (tick + offset) / scale : (tick + offset) * scale;
   }
   if (coded.gaps === undefined) return values;

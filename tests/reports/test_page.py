@@ -1,0 +1,171 @@
+"""The page in a real browser: alone, live, readable without script, in print, in the dark."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Locator, Page
+
+from seamlog.results import Results
+from tests.reports.conftest import Visitor
+from tests.reports.sample_results import SLOW_S_MM
+
+WIDTH = "#plot-0-bead-stations-width_mm"
+ERROR = "#plot-0-tracking-error-error_mm"
+
+
+def _hover(page: Page, plot: str, fraction: float) -> None:
+    over = page.locator(f"{plot} .u-over")
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + fraction * box["width"], box["y"] + box["height"] / 2)
+
+
+def _cursor(page: Page, figure: str) -> float | None:
+    text = page.locator(figure).get_attribute("data-cursor")
+    return None if text is None else float(text)
+
+
+def _ink(canvas: Locator) -> int:
+    """Pixels of a canvas that something was drawn on."""
+    count = canvas.evaluate(
+        """canvas => {
+            const { width, height } = canvas;
+            const { data } = canvas.getContext("2d").getImageData(0, 0, width, height);
+            let ink = 0;
+            for (let i = 3; i < data.length; i += 4) ink += data[i] > 0;
+            return ink;
+        }"""
+    )
+    return int(count)
+
+
+def _seconds_at(sample: Results, s_mm: float) -> float:
+    """Report time of a place, from the join's table."""
+    parts = {part.part: part for part in sample.parts()}
+    join = sample.columns(parts["join"], "stations")
+    origin = sample.columns(parts["identification"], "residual")["stamp_ns"][0]
+    return float(np.interp(s_mm, join["s_mm"], (join["stamp_ns"] - origin) / 1e9))
+
+
+def test_opens_alone_and_live(visitor: Visitor, sample_page: Path) -> None:
+    visit = visitor.open(sample_page)
+    assert visit.page.locator("html").get_attribute("data-state") == "live"
+    loaded = [url for url in visit.requests if not url.startswith("data:")]
+    assert loaded == [sample_page.as_uri()]
+    assert visit.complaints == []
+
+
+def test_every_drawing_is_replaced_by_a_live_plot(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page).page
+    plots = page.locator("figure.plot")
+    assert plots.count() >= 10
+    for plot in plots.all():
+        assert _ink(plot.locator("canvas")) > 500
+        assert plot.locator(".static").is_hidden()
+
+
+def test_hovering_the_width_moves_time_plots_and_the_photo(
+    visitor: Visitor, sample_page: Path, sample: Results
+) -> None:
+    page = visitor.open(sample_page).page
+    _hover(page, WIDTH, 0.4)
+    s_mm = _cursor(page, WIDTH)
+    assert s_mm is not None and 60 < s_mm < 90
+    assert _cursor(page, ERROR) == pytest.approx(_seconds_at(sample, s_mm), abs=0.03)
+    assert _cursor(page, "#picture-0-bead-overlay") == pytest.approx(s_mm)
+    marker = page.locator("#picture-0-bead-overlay .marker.on line").first
+    assert float(marker.get_attribute("x1") or "nan") == pytest.approx(40 + 10 * s_mm)
+    assert "mm" in page.locator(f"{ERROR} .now").inner_text()
+
+
+def test_hovering_the_photo_and_a_time_plot_moves_the_width(
+    visitor: Visitor, sample_page: Path, sample: Results
+) -> None:
+    page = visitor.open(sample_page).page
+    stage = page.locator("#picture-0-bead-overlay .stage")
+    stage.scroll_into_view_if_needed()
+    box = stage.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] * 840 / 2030, box["y"] + box["height"] / 2)
+    on_photo = _cursor(page, WIDTH)
+    assert on_photo is not None and abs(on_photo - 80) < 12
+    _hover(page, ERROR, 0.25)
+    seconds, s_mm = _cursor(page, ERROR), _cursor(page, WIDTH)
+    assert seconds is not None and s_mm is not None
+    assert seconds == pytest.approx(_seconds_at(sample, s_mm), abs=0.05)
+
+
+def test_a_finding_leads_to_its_place(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page).page
+    _hover(page, WIDTH, 0.1)
+    page.locator("#verdict a.place").first.click()
+    assert _cursor(page, WIDTH) == pytest.approx(SLOW_S_MM, abs=0.2)
+
+
+def test_arrow_keys_and_slider_move_the_cursor(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page).page
+    before = _cursor(page, WIDTH)
+    page.locator(f"{WIDTH} .live").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    after = _cursor(page, WIDTH)
+    assert before is not None and after == pytest.approx(before + 0.5)
+    page.locator("#cursor-place").focus()
+    page.keyboard.press("ArrowLeft")
+    moved = _cursor(page, WIDTH)
+    assert after is not None and moved is not None and moved < after
+    assert "width" in page.locator("#cursor-text").inner_text()
+
+
+def test_zooming_one_time_plot_zooms_the_others(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page).page
+    whole = page.locator("#plot-0-tracking-error-command").screenshot()
+    _hover(page, ERROR, 0.2)
+    page.mouse.down()
+    _hover(page, ERROR, 0.4)
+    page.mouse.up()
+    assert page.locator("#plot-0-tracking-error-command").screenshot() != whole
+    page.locator(f"{ERROR} .live").focus()
+    page.keyboard.press("Escape")
+    _hover(page, ERROR, 0.998)
+    assert _cursor(page, ERROR) == pytest.approx(63.96, abs=0.1)
+
+
+def test_without_script_verdict_and_drawings_are_there(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page, java_script_enabled=False).page
+    assert "FAIL" in page.locator(".banner .word").inner_text()
+    drawings = page.locator("figure.plot .static svg")
+    assert drawings.count() == page.locator("figure.plot").count()
+    assert all(drawing.is_visible() for drawing in drawings.all())
+    assert page.locator("#cursor").is_hidden() and page.locator("#theme").is_hidden()
+
+
+def test_print_shows_drawings_and_no_controls(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page, color_scheme="dark").page
+    page.emulate_media(media="print")
+    assert page.locator(f"{WIDTH} .static svg").is_visible()
+    assert page.locator(f"{WIDTH} .live").is_hidden()
+    assert page.locator("#cursor").is_hidden()
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert page.pdf(format="A4").startswith(b"%PDF")
+
+
+def test_dark_by_the_system_and_by_the_button(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page, color_scheme="dark").page
+    background = "getComputedStyle(document.body).backgroundColor"
+    dark = page.evaluate(background)
+    plot = page.locator(f"{WIDTH} canvas")
+    before = plot.evaluate("canvas => canvas.toDataURL()")
+    page.locator("#theme").click()
+    assert page.evaluate(background) == "rgb(255, 255, 255)" != dark
+    page.wait_for_function(
+        "before => document.querySelector(before[0]).toDataURL() !== before[1]",
+        arg=[f"{WIDTH} canvas", before],
+    )
+
+
+def test_phone_width_does_not_scroll_sideways(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page, viewport={"width": 390, "height": 844}).page
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
