@@ -1,0 +1,61 @@
+"""The centreline: a cubic B-spline through path points, walked at even arc length."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_lsq_spline
+
+from .plane import Points
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Centreline:
+    """Places at even arc length: `s` (n,), `points` (n, 2), unit `normals` (n, 2), one unit.
+
+    The normal is the direction of travel turned from x towards y.
+    """
+
+    s: Floats
+    points: Points
+    normals: Points
+
+    def shifted(self, offset: Floats) -> Points:
+        """Places moved along their normals by `offset` (n,)."""
+        return np.asarray(self.points + offset[:, None] * self.normals)
+
+
+def arc_length(points: Points) -> Floats:
+    """Length along a polyline from its first point."""
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def fit_centreline(path: Points, step: float, knot_spacing: float) -> Centreline:
+    """Least-squares B-spline through `path` (n, 2), n >= 2, with a knot every `knot_spacing`."""
+    length = arc_length(path)
+    keep = np.concatenate([[True], np.diff(length) > 1e-9])
+    path, length = path[keep], length[keep]
+    curve = _spline(path, length, knot_spacing)
+    dense = np.linspace(0.0, length[-1], max(16, int(4 * length[-1] / step)))
+    walked = arc_length(curve(dense))
+    s = np.arange(0.0, walked[-1] + 1e-9, step)
+    at = np.interp(s, walked, dense)
+    tangent = curve.derivative()(at)
+    tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
+    normals = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    return Centreline(s, np.asarray(curve(at)), normals)
+
+
+def _spline(path: Points, length: Floats, knot_spacing: float) -> BSpline:
+    if len(path) < 8:
+        path = np.column_stack(
+            [np.interp(np.linspace(0, length[-1], 16), length, column) for column in path.T]
+        )
+        length = np.linspace(0, length[-1], 16)
+    inner = max(0, min(int(length[-1] / knot_spacing) - 1, len(path) // 4))
+    places = np.linspace(0.0, length[-1], inner + 2)
+    knots = np.concatenate([[0.0] * 3, places, [length[-1]] * 3])
+    return make_lsq_spline(length, path, knots, k=3)

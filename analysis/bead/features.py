@@ -1,0 +1,61 @@
+"""What tells a bead from its plate at each place: lightness, colour, and the energy of fine detail."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .image import Photo
+
+Features = NDArray[np.float32]
+"""Shape (rows, columns, k): lightness [grey levels], two colours if there are any, log texture."""
+
+_TEXTURE_FLOOR = 1.5
+"""Grey levels of detail that count as none: 8-bit rounding and a little camera noise."""
+
+
+def texture_energy(lightness: NDArray[np.float32], reach_px: float) -> NDArray[np.float32]:
+    """Log of the local strength of detail finer than `reach_px`, shape as given."""
+    detail = lightness - cv2.GaussianBlur(lightness, (0, 0), reach_px)
+    power = cv2.GaussianBlur(detail * detail, (0, 0), reach_px)
+    return np.asarray(np.log(np.sqrt(np.maximum(power, 0)) + _TEXTURE_FLOOR), dtype=np.float32)
+
+
+def stack_texture(opponent: NDArray[np.float32], reach_px: float) -> Features:
+    """Opponent channels with their texture energy as one more channel."""
+    texture = texture_energy(np.ascontiguousarray(opponent[..., 0]), reach_px)
+    return np.concatenate([opponent, texture[..., None]], axis=2)
+
+
+def strip_features(opponent: NDArray[np.float32], reach_px: float) -> Features:
+    """As `stack_texture`, for strips: the texture's outer border is drawn in by its own reach.
+
+    A window that touches the bead's edge sees that edge as detail; without the correction the
+    texture alone would put each toe too far out.
+    """
+    features = stack_texture(opponent, reach_px)
+    wide = 2 * round(1.5 * reach_px) + 1
+    features[..., -1] = cv2.erode(features[..., -1], np.ones((1, wide), np.uint8))
+    return features
+
+
+def reduced_features(photo: Photo, longest_px: int) -> tuple[Features, float]:
+    """Features of the photo reduced to `longest_px`, and the photo px per reduced px.
+
+    Texture is taken before reducing, so that fine detail still counts.
+    """
+    factor = max(1.0, max(photo.width_px, photo.height_px) / longest_px)
+    reach = max(1.5, 0.75 * factor)
+    full = stack_texture(photo.opponent(), reach)
+    size = (round(photo.width_px / factor), round(photo.height_px / factor))
+    reduced: NDArray[Any] = cv2.resize(full, size, interpolation=cv2.INTER_AREA)
+    return reduced.reshape(size[1], size[0], -1).astype(np.float32), factor
+
+
+def robust_scale(features: Features) -> NDArray[np.float32]:
+    """Spread of each feature over a picture, with floors below which a change means nothing."""
+    low, high = np.percentile(features.reshape(-1, features.shape[2]), (16, 84), axis=0)
+    floors = np.full(features.shape[2], 3.0)
+    floors[0], floors[-1] = 6.0, 0.25
+    return np.maximum((high - low) / 2, floors).astype(np.float32)

@@ -1,0 +1,73 @@
+"""The strip: one remap that undoes lens, perspective and the seam's curve at once."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .curve import Centreline
+from .image import Photo
+from .plane import Plane
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Strip:
+    """A straightened bead: a row per place of `line`, a column per offset across it.
+
+    `opponent` has shape (rows, columns, channels), `valid` tells which samples lie in the photo,
+    `offsets` (columns,) are in the plane's unit, `step` is their distance.
+    """
+
+    line: Centreline
+    opponent: Floats
+    valid: NDArray[np.bool_]
+    offsets: NDArray[np.float64]
+    step: float
+
+    def column(self, offset: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Column of an offset, as a fraction."""
+        return np.asarray((offset - self.offsets[0]) / self.step)
+
+    def offset(self, column: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Offset of a (fractional) column."""
+        return np.asarray(self.offsets[0] + column * self.step)
+
+
+def sample_strip(
+    photo: Photo, plane: Plane, line: Centreline, reach: float, step: float, cubic: bool = True
+) -> Strip:
+    """Sample the photo along `line`, `reach` to both sides, every `step` across."""
+    count = int(np.ceil(reach / step))
+    offsets = np.arange(-count, count + 1) * step
+    x, y = _maps(plane, line, offsets)
+    valid = (x >= 0) & (x <= photo.width_px - 1) & (y >= 0) & (y <= photo.height_px - 1)
+    left, right = _span(x, photo.width_px)
+    top, bottom = _span(y, photo.height_px)
+    part = photo.opponent(slice(top, bottom), slice(left, right))
+    sampled = cv2.remap(
+        part,
+        (x - left).astype(np.float32),
+        (y - top).astype(np.float32),
+        cv2.INTER_CUBIC if cubic else cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    return Strip(line, sampled.reshape(*x.shape, -1), valid, offsets, step)
+
+
+def _span(values: NDArray[np.float64], size: int) -> tuple[int, int]:
+    low = int(np.clip(np.floor(values.min()) - 3, 0, size - 4))
+    return low, int(np.clip(np.ceil(values.max()) + 4, low + 4, size))
+
+
+def _maps(
+    plane: Plane, line: Centreline, offsets: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Photo coordinates of all samples: numerators and denominator are linear in the offset."""
+    matrix = plane.px_from_plane()
+    base = line.points @ matrix[:, :2].T + matrix[:, 2]
+    slope = line.normals @ matrix[:, :2].T
+    x, y, w = (base[:, k, None] + slope[:, k, None] * offsets for k in range(3))
+    return x / w, y / w

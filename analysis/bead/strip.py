@@ -1,0 +1,244 @@
+"""The strip method: straighten the bead, find its toes, recentre, repeat, refine below a pixel."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from seamlog.errors import EvidenceError, ImageError
+
+from .band import find_band
+from .chain import best_chain
+from .curve import arc_length, fit_centreline
+from .edge_model import EdgePlaces, locate_edges
+from .features import Features, stack_texture, strip_features
+from .image import Photo
+from .measurement import BeadMeasurement
+from .path import find_path
+from .plane import Plane, Points
+from .sampling import Strip, sample_strip
+from .toes import Extent, find_toes
+from .width import Toes, assemble
+from .zones import fisher_direction, zone
+
+Floats = NDArray[np.float64]
+
+STATION_MM = 0.25
+STATION_PX = 2.0
+NARROWEST_PX = 8.0
+_ALONG_PX = 2.0
+_ALONG_WIDTHS = 0.03
+"""Gaussian averaging along the seam: this many px, or this part of the width if that is more."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """A path in the plane's unit with the bead's rough half width and how evident it was."""
+
+    points: Points
+    half: float
+    evidence: float
+    rival: float
+
+
+def measure_strip(
+    photo: Photo, plane: Plane, prior: Points | None = None, start: str | None = None
+) -> BeadMeasurement:
+    """Measure bead width at stations along the bead; see `BeadDetector`.
+
+    `prior` is a path in the plane's unit that lies in the bead, (n, 2), n >= 2. Raises
+    `EvidenceError` where no bead can be told from the plate and `ImageError` for one narrower
+    than 8 px.
+    """
+    found = _given_path(photo, plane, prior) if prior is not None else _found_path(photo, plane)
+    unit = plane.unit_per_px(plane.to_px(found.points))
+    _refuse_narrow(photo, 2 * found.half / unit)
+    rows_per_station, row_step = _row_step(plane, unit)
+    path, half = found.points, found.half
+    strip, extent = _straighten(photo, plane, path, half, unit, row_step, freedom=0.45)
+    for freedom in (0.35, 0.25):
+        path = _recentred(strip, extent)
+        half = float(np.median(extent.half)) * unit
+        _refuse_narrow(photo, 2 * half / unit)
+        strip, extent = _straighten(photo, plane, path, half, unit, row_step, freedom)
+    toes = _refine(strip, extent, unit)
+    return assemble(
+        photo, plane, strip, toes, rows_per_station, found.evidence, found.rival, start
+    )
+
+
+def _refuse_narrow(photo: Photo, width_px: float) -> None:
+    if width_px < NARROWEST_PX:
+        raise ImageError(
+            f"{photo.name}: the bead is {width_px:.1f} px across, too few to measure (at least "
+            f"{NARROWEST_PX:g}, better 30); take the photo from nearer"
+        )
+
+
+def _row_step(plane: Plane, unit: float) -> tuple[int, float]:
+    station = STATION_MM if plane.unit == "mm" else STATION_PX
+    count = max(1, int(np.ceil(station / unit)))
+    return count, station / count
+
+
+def _found_path(photo: Photo, plane: Plane) -> _Path:
+    coarse = find_path(photo)
+    points = plane.to_plane(coarse.centre_px)
+    unit = plane.unit_per_px(coarse.centre_px)
+    return _Path(
+        points,
+        float(np.median(coarse.half_width_px)) * unit,
+        float(coarse.evidence.mean()),
+        coarse.rival,
+    )
+
+
+def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
+    """The band around a given path, at a resolution at which its wander does not matter."""
+    prior = _inside_photo(photo, plane, np.asarray(prior, dtype=np.float64))
+    unit = plane.unit_per_px(plane.to_px(prior))
+    length = float(arc_length(prior)[-1])
+    reach = min(0.25 * max(photo.width_px, photo.height_px) * unit, 0.5 * length)
+    step = max(unit, reach / 80)
+    line = fit_centreline(prior, step, 6 * step)
+    strip = sample_strip(photo, plane, line, reach, step, cubic=False)
+    features = stack_texture(strip.opponent, 1.5)
+    nearness = np.exp(-0.5 * (strip.offsets / (0.4 * reach)) ** 2).astype(np.float32)
+    weight = np.append(nearness, nearness[-1:])
+    band = find_band(_blocks(features), 3.0, 0.7 * features.shape[1], weight)
+    if band is None:
+        raise EvidenceError(
+            f"{photo.name}: no bead can be told from the plate along the given path; check that "
+            "the photo and its calibration belong to this weld"
+        )
+    middle = strip.offset((band.left + band.right) / 2 - 0.5)
+    rows = (np.arange(band.first, band.last + 1) * 2).clip(0, len(line.s) - 1)
+    points = line.points[rows] + middle[:, None] * line.normals[rows]
+    half = float(np.median(band.right - band.left)) / 2 * step
+    return _Path(points, half, float(band.evidence.mean()), 0.0)
+
+
+def _blocks(features: Features) -> Features:
+    smooth = cv2.GaussianBlur(features, (1, 0), sigmaX=0.01, sigmaY=2.0)
+    return np.asarray(smooth.reshape(features.shape)[::2])
+
+
+def _inside_photo(photo: Photo, plane: Plane, prior: Points) -> Points:
+    px = plane.to_px(prior)
+    inside = (px >= 0).all(axis=1) & (px <= (photo.width_px - 1, photo.height_px - 1)).all(axis=1)
+    if inside.sum() < 2:
+        raise EvidenceError(
+            f"{photo.name}: the given path does not run through the photo; check the calibration"
+        )
+    return prior[inside]
+
+
+def _recentred(strip: Strip, extent: Extent) -> Points:
+    """The middle between the toes; where a toe is off the photo, the offset of the nearest row."""
+    offsets = strip.offset(extent.middle)
+    rows = np.arange(len(offsets))
+    columns = strip.valid.shape[1] - 1
+    seen = np.ones(len(rows), dtype=bool)
+    for edge in (extent.left - 3, extent.right + 3):
+        seen &= strip.valid[rows, np.clip(np.rint(edge).astype(int), 0, columns)]
+    if seen.any():
+        offsets = np.interp(rows, rows[seen], offsets[seen])
+    return strip.line.shifted(_running_median(offsets, extent.half))
+
+
+def _straighten(
+    photo: Photo,
+    plane: Plane,
+    path: Points,
+    half: float,
+    unit: float,
+    row_step: float,
+    freedom: float,
+) -> tuple[Strip, Extent]:
+    line = fit_centreline(path, row_step, max(8.0 * half, 16 * unit))
+    strip = sample_strip(photo, plane, line, 2.4 * half + 8 * unit, unit)
+    features = strip_features(strip.opponent, max(1.5, 0.03 * half / unit))
+    middle = strip.column(np.zeros(len(line.s)))
+    rough = Extent(middle - half / unit, middle + half / unit, np.zeros(len(line.s)))
+    first = find_toes(features, strip.valid, rough, freedom)
+    return strip, find_toes(features, strip.valid, _calmed(first), 0.6 * freedom)
+
+
+def _calmed(extent: Extent) -> Extent:
+    return Extent(
+        _running_median(extent.left, extent.half),
+        _running_median(extent.right, extent.half),
+        extent.present,
+    )
+
+
+def _running_median(values: Floats, half: Floats) -> Floats:
+    from scipy.ndimage import gaussian_filter1d, median_filter
+
+    size = int(max(5, np.median(half)))
+    calm = median_filter(values, 2 * (size // 2) + 1, mode="nearest")
+    return np.asarray(gaussian_filter1d(calm, size / 4, mode="nearest"))
+
+
+def _refine(strip: Strip, extent: Extent, unit: float) -> tuple[Toes, Toes]:
+    """Sub-pixel toes of both sides, in offsets."""
+    width_px = 2 * float(np.median(extent.half))
+    row_px = float(strip.line.s[1] - strip.line.s[0]) / unit
+    along = max(_ALONG_PX, _ALONG_WIDTHS * width_px) / row_px
+    smooth = cv2.GaussianBlur(strip.opponent, (1, 0), sigmaX=0.01, sigmaY=along)
+    smooth = smooth.reshape(strip.opponent.shape)
+    sides = []
+    for side, edge in ((-1, extent.left), (1, extent.right)):
+        signal, distance = _projection(smooth, strip.valid, edge, side, extent)
+        near = _sharpest(signal, edge, side, 3 + 0.06 * float(np.median(extent.half)))
+        places = locate_edges(signal, near, side)
+        sides.append(_toes(strip, places, extent, edge, side, distance))
+    return sides[0], sides[1]
+
+
+def _projection(
+    opponent: Features, valid: NDArray[np.bool_], edge: Floats, side: int, extent: Extent
+) -> tuple[NDArray[np.float32], float]:
+    """The one colour mixture that tells bead from plate best at this toe, shape (rows, columns)."""
+    depth = max(4.0, 0.25 * float(np.median(extent.half)))
+    columns = opponent.shape[1]
+    inner = (edge - depth, edge - 1) if side > 0 else (edge + 1, edge + depth)
+    outer = (edge + 1, edge + depth) if side > 0 else (edge - depth, edge - 1)
+    inside, outside = (zone(columns, *bounds, valid) for bounds in (inner, outer))
+    direction, distance = fisher_direction(opponent[inside], opponent[outside])
+    return (opponent @ direction.astype(np.float32)), distance
+
+
+def _sharpest(
+    signal: NDArray[np.float32], edge: Floats, side: int, reach: float
+) -> Floats:
+    """Chain of the steepest falls from bead to plate within `reach` columns of `edge`."""
+    smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.5)
+    fall = -side * np.gradient(smooth, axis=1)
+    away = side * (np.arange(signal.shape[1]) - edge[:, None])
+    typical = np.percentile(np.where(np.abs(away) <= reach, fall, 0).max(axis=1), 50) + 1e-6
+    score = np.clip(fall / typical, 0, 1.5) * (1 + 0.05 * away / reach)
+    score = np.where(np.abs(away) <= reach, score, -1e6).astype(np.float32)
+    return best_chain(score, 0.1).astype(np.float64)
+
+
+def _toes(
+    strip: Strip, places: EdgePlaces, extent: Extent, edge: Floats, side: int, distance: float
+) -> Toes:
+    column = places.column
+    rows = np.arange(len(column))
+    reach = 3 + 2 * places.blur_px
+    outside = np.clip(np.rint(column + side * reach).astype(int), 0, strip.valid.shape[1] - 1)
+    return Toes(
+        offset=strip.offset(column),
+        u_noise=places.u * strip.step,
+        u_model=places.between_models * strip.step,
+        height=places.height,
+        in_frame=strip.valid[rows, outside],
+        present=extent.present,
+        disagreement=np.abs(column - edge) * strip.step,
+        distance=distance,
+        model=places.model,
+        blur_px=places.blur_px,
+    )

@@ -1,0 +1,189 @@
+"""From two toes to widths: uncertainty per station, flags with their reason, confidence."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from seamlog.errors import EvidenceError
+
+from .image import Photo
+from .measurement import BeadMeasurement
+from .plane import Plane, Points
+from .sampling import Strip
+
+Floats = NDArray[np.float64]
+
+_FAINT = 0.04
+"""Noise of a toe, as a part of the width, above which a station is flagged."""
+_REFUSED = 0.08
+
+
+@dataclass(frozen=True, slots=True)
+class Toes:
+    """One side's toes, a value per strip row: offset and its uncertainties in the plane's unit.
+
+    `height` is the step from plate to bead (grey levels), `in_frame` whether the plate beyond is
+    in the photo, `present` how much the inside looks like bead, `disagreement` the distance
+    between the sharpest edge and where the looks change. `distance` is how far bead and plate are
+    apart at this toe, in standard deviations.
+    """
+
+    offset: Floats
+    u_noise: Floats
+    u_model: Floats
+    height: Floats
+    in_frame: NDArray[np.bool_]
+    present: Floats
+    disagreement: Floats
+    distance: float
+    model: str
+    blur_px: float
+
+
+def assemble(
+    photo: Photo,
+    plane: Plane,
+    strip: Strip,
+    toes: tuple[Toes, Toes],
+    rows_per_station: int,
+    evidence: float,
+    rival: float,
+    start: str | None,
+) -> BeadMeasurement:
+    """Stations out of strip rows; `EvidenceError` when the evidence carries no width at all."""
+    left, right = toes
+    width = right.offset - left.offset
+    typical = float(np.median(width))
+    reasons = _reasons(left, right, width, typical, strip)
+    flagged = reasons != ""
+    confidence = _confidence(left, right, flagged, typical, evidence, rival, strip.step)
+    if confidence < _REFUSED:
+        raise EvidenceError(
+            f"{photo.name}: a band was found, but its edges cannot be told from the plate "
+            f"(confidence {confidence:.2f}); take a sharper photo with even light, from above"
+        )
+    pick = slice(rows_per_station // 2, None, rows_per_station)
+    u_noise = np.hypot(left.u_noise, right.u_noise)
+    left_px, right_px, centre_px = _points(plane, strip, left, right)
+    backwards, starts_at = _direction(centre_px, start)
+    order = slice(None, None, -1) if backwards else slice(None)
+    sides = (right_px, left_px) if backwards else (left_px, right_px)
+    s = strip.line.s[pick]
+    return BeadMeasurement(
+        unit=plane.unit,
+        s=(s[-1] - s[::-1] if backwards else s - s[0]),
+        width=np.where(width > 0, width, np.nan)[pick][order],
+        u_width=_u_width(left, right, u_noise, width, plane)[pick][order],
+        u_noise=u_noise[pick][order],
+        left_px=sides[0][pick][order],
+        right_px=sides[1][pick][order],
+        centre_px=centre_px[pick][order],
+        flagged=flagged[pick][order],
+        reason=tuple(str(reason) for reason in reasons[pick][order]),
+        unit_per_px=strip.step,
+        confidence=confidence,
+        warnings=_warnings(plane, typical / strip.step, rival, confidence, flagged),
+        starts_at=starts_at,
+        direction_known=start is not None,
+        open_start=_at_frame(photo, centre_px[-1 if backwards else 0], typical / strip.step),
+        open_stop=_at_frame(photo, centre_px[0 if backwards else -1], typical / strip.step),
+    )
+
+
+def _reasons(
+    left: Toes, right: Toes, width: Floats, typical: float, strip: Strip
+) -> NDArray[np.str_]:
+    """Why a row is not to be trusted, or ''."""
+    reasons = np.full(len(width), "", dtype="U40")
+    for name, toe in (("left", left), ("right", right)):
+        reasons[_strays(toe.offset, typical, strip)] = f"{name} toe strays"
+        reasons[toe.u_noise > _FAINT * typical] = f"{name} toe too faint"
+        reasons[toe.height < 0.15 * np.median(toe.height)] = f"{name} toe not told from the plate"
+        reasons[~toe.in_frame] = f"{name} toe at the frame of the photo"
+    reasons[left.present < 0] = "no bead seen"
+    reasons[width <= 0] = "no width"
+    return reasons
+
+
+def _strays(offset: Floats, typical: float, strip: Strip) -> NDArray[np.bool_]:
+    step = float(strip.line.s[1] - strip.line.s[0])
+    size = 2 * int(max(3, 0.5 * typical / step) // 2) + 1
+    away = offset - median_filter(offset, size, mode="nearest")
+    spread = 1.4826 * float(np.median(np.abs(away)))
+    return np.abs(away) > np.maximum(6 * spread, 0.06 * typical)
+
+
+def _u_width(left: Toes, right: Toes, u_noise: Floats, width: Floats, plane: Plane) -> Floats:
+    """Standard uncertainty: noise, edge model (both toes, rectangular), scale, plane residual."""
+    model = np.hypot(left.u_model, right.u_model) / np.sqrt(3)
+    scale = plane.scale_relative_u * width
+    residual = plane.residual * np.sqrt(2)
+    return np.sqrt(u_noise**2 + model**2 + scale**2 + residual**2)
+
+
+def _confidence(
+    left: Toes,
+    right: Toes,
+    flagged: NDArray[np.bool_],
+    typical: float,
+    evidence: float,
+    rival: float,
+    step: float,
+) -> float:
+    """0 to 1: the weakest of what a trustworthy width needs, not their average."""
+    apart = min(left.distance, right.distance)
+    astray = max(float(np.median(toe.disagreement)) for toe in (left, right)) / max(typical, step)
+    parts = (
+        np.clip(apart / 1.2, 0, 1),
+        np.clip(evidence / 0.6, 0, 1),
+        np.clip((1.0 - float(flagged.mean())) / 0.7, 0, 1),
+        np.clip((1.1 - rival) / 0.4, 0, 1),
+        np.clip(typical / step / 30, 0, 1),
+        np.clip(1.3 - astray / 0.1, 0, 1),
+    )
+    return float(min(parts))
+
+
+def _warnings(
+    plane: Plane, width_px: float, rival: float, confidence: float, flagged: NDArray[np.bool_]
+) -> tuple[str, ...]:
+    warnings = []
+    if plane.unit == "px":
+        warnings.append("no calibration: widths are in pixels, not in millimetres")
+    if width_px < 30:
+        warnings.append(f"the bead is only {width_px:.0f} px across; 30 or more are wanted")
+    if rival > 0.7:
+        warnings.append("another band in the photo looks as much like a bead")
+    if confidence < 0.5:
+        warnings.append(f"confidence is low ({confidence:.2f}): check the overlay")
+    if flagged.mean() > 0.1:
+        warnings.append(f"{100 * flagged.mean():.0f} % of the stations are flagged")
+    return tuple(warnings)
+
+
+def _points(plane: Plane, strip: Strip, left: Toes, right: Toes) -> tuple[Points, Points, Points]:
+    middle = (left.offset + right.offset) / 2
+    a, b, c = (
+        plane.to_px(strip.line.shifted(offset)) for offset in (left.offset, right.offset, middle)
+    )
+    return a, b, c
+
+
+def _direction(centre_px: Points, start: str | None) -> tuple[bool, str]:
+    """Whether the rows run against the weld, and which end of the photo s = 0 lies at."""
+    along = centre_px[-1] - centre_px[0]
+    if start is None:
+        axis = int(np.argmax(np.abs(along)))
+        return bool(along[axis] < 0), ("left", "top")[axis]
+    axis = 0 if start in ("left", "right") else 1
+    towards = along[axis] if start in ("left", "top") else -along[axis]
+    return bool(towards < 0), start
+
+
+def _at_frame(photo: Photo, point: Points, width_px: float) -> bool:
+    x, y = point
+    margin = max(6.0, 0.15 * width_px)
+    nearest = min(x, y, photo.width_px - 1 - x, photo.height_px - 1 - y)
+    return bool(nearest < margin)
