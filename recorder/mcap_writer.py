@@ -109,6 +109,10 @@ class SessionFile:
         """
         _rename(self._recording.partial, Path(self._recording.path), self._recording.force)
 
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
     def _cut(self) -> None:
         """Drop the torn record that a failed write left behind."""
         descriptor = self._file.fileno()

@@ -79,6 +79,11 @@ class Recorder:
         """The session file, there once the recording is closed."""
         return Path(self._recording.path)
 
+    @property
+    def recorder_pid(self) -> int:
+        """Process id of the recorder process."""
+        return self._process.pid
+
     def channel(self, topic: str, metadata: Mapping[str, str] | None = None) -> Channel:
         """The channel of `topic` for this thread, made when first asked for.
 
