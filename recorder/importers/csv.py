@@ -16,11 +16,11 @@ class CsvImporter:
         """All columns that hold numbers; `ImportFailed` if there is no table."""
         import pandas as pd
 
+        with path.open(encoding="utf-8", errors="replace") as file:
+            header = file.readline()
         try:
-            table = pd.read_csv(path, sep=None, engine="python", skipinitialspace=True)
-        except FileNotFoundError:
-            raise
-        except (ValueError, pd.errors.ParserError, OSError) as error:
+            table = pd.read_csv(path, sep=_separator(header), skipinitialspace=True)
+        except (ValueError, pd.errors.ParserError) as error:
             raise ImportFailed(f"{path} cannot be read as a table: {error}") from error
         numbers = table.apply(pd.to_numeric, errors="coerce")
         columns = {str(name).strip(): numbers[name].to_numpy() for name in numbers}
@@ -31,3 +31,8 @@ class CsvImporter:
                 "columns into its first line"
             )
         return found
+
+
+def _separator(header: str) -> str:
+    """The separator that the header line has most of."""
+    return max(",;\t", key=header.count)
