@@ -64,7 +64,7 @@ class Engine:
             self._persist(lambda: self._sign(ending))
             self._persist(self._file.finish)
             self._sync_whole()
-            self._file.take_name()
+            self._take_name()
             shutil.rmtree(self._folder, ignore_errors=True)
         except OSError as error:
             where = f"{self._recording.partial} is unfinished; the rest is in {self._folder}"
@@ -193,6 +193,13 @@ class Engine:
             self._file.sync_whole()
         except OSError as error:
             self._find(f"the last sync failed, the file may not survive a loss of power: {error}")
+
+    def _take_name(self) -> None:
+        try:
+            self._file.take_name()
+        except OSError as error:
+            partial = self._recording.partial
+            self._find(f"the session is whole, but keeps its name {partial}: {error}")
 
     def _find(self, finding: str) -> None:
         if finding not in self._findings:
