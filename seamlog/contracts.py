@@ -40,7 +40,10 @@ class Controller(Protocol):
     Made as `Factory(config, axis, period_s)`, where `Factory.Config` is a pydantic model.
     """
 
-    state_names: Sequence[str]
+    @property
+    def state_names(self) -> Sequence[str]:
+        """Names of the values of `state`."""
+        ...
 
     def output(
         self,

@@ -22,8 +22,8 @@ TRUTH = Axis(1.0, 2.14, 0.214, saturation=20.0, unit="N m")
 
 
 def line(speed_m_s: float, seconds: float = 30.0) -> Reference:
-    time = 0.04 * np.arange(round(seconds / 0.04))
-    return Reference(speed_m_s * time, np.full(len(time), speed_m_s), np.zeros(len(time)))
+    time = np.asarray(0.04 * np.arange(round(seconds / 0.04)), dtype=np.float64)
+    return Reference(np.multiply(speed_m_s, time), np.full(len(time), speed_m_s), np.zeros(len(time)))
 
 
 def test_the_truth_is_found_exactly_without_noise(loop: MakeLoop) -> None:
