@@ -26,6 +26,8 @@ CALIBRATION = "calibration/table_from_camera.json"
 HALF_WINDOW_S = 0.6
 _FEWEST = 12
 _ROUNDS = 3
+_LEAST_SCATTER_MM = 0.1
+"""Residuals of this size are no outliers: smoothing leaves such where the speed changes."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,7 @@ def _local_fits(
 
 
 def _tukey(residual: FloatArray) -> FloatArray:
-    scale = 4.685 * max(_spread(residual), 1e-9)
+    scale = 4.685 * max(_spread(residual), _LEAST_SCATTER_MM)
     return np.asarray(np.clip(1 - (residual / scale) ** 2, 0, None) ** 2)
 
 
