@@ -1,7 +1,8 @@
 """What the control loop saw and did, one row per command, in the order of log time.
 
 The one place where encoder, reference and command messages are brought onto the control grid:
-a command belongs to the newest encoder and reference message that had arrived by its log time.
+a command belongs to the newest encoder and reference message that had arrived by its log time. An
+encoder message counts once: where none came since the last command, position and velocity are NaN.
 """
 
 import math
@@ -111,13 +112,14 @@ def load_axis_record(session: "Session") -> AxisRecord:
             "messages make fewer than three control periods; record for longer"
         )
     newest, times = newest[known], times[known]
-    stamp_ns = encoder["stamp_ns"][newest]
+    fresh = np.diff(newest, prepend=-1) > 0
+    stamp_ns = _stamps(encoder["stamp_ns"][newest], command["stamp_ns"][known], fresh)
     asked = _reference_columns(reference, times)
     return AxisRecord(
         stamp_ns=stamp_ns,
         log_time_ns=times,
-        position_m=encoder["position_m"][newest],
-        velocity_m_s=encoder["velocity_m_s"][newest],
+        position_m=np.where(fresh, encoder["position_m"][newest], np.nan),
+        velocity_m_s=np.where(fresh, encoder["velocity_m_s"][newest], np.nan),
         reference_m=asked["position_m"],
         reference_m_s=asked["velocity_m_s"],
         reference_m_s2=asked["acceleration_m_s2"],
@@ -126,6 +128,14 @@ def load_axis_record(session: "Session") -> AxisRecord:
         drive=parse_drive(session.channel_metadata(COMMAND), str(session.path)),
         period_s=_period_s(stamp_ns),
     )
+
+
+def _stamps(
+    encoder_ns: NDArray[np.int64], command_ns: NDArray[np.int64], fresh: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Stamps of the positions; where none came, when it would have come beside the command."""
+    usual_ns = int(np.median((command_ns - encoder_ns)[fresh]))
+    return np.where(fresh, encoder_ns, command_ns - usual_ns)
 
 
 def _reference_columns(

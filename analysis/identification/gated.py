@@ -122,5 +122,5 @@ def _fit(
 
 def _motion(windows: _Windows) -> Motion:
     used = windows.sliding
-    acceleration = windows.speed_change_m_s / windows.duration_s
-    return Motion(windows.velocity_m_s[used], acceleration[used], float(used.mean()))
+    acceleration = windows.speed_change_m_s[used] / windows.duration_s[used]
+    return Motion(windows.velocity_m_s[used], acceleration, float(used.mean()))
