@@ -29,8 +29,8 @@ class GatedRLSConfig(BaseModel):
     filter_pole: float = Field(0.97, ge=0, lt=1)
     forgetting_rate: float = Field(0.005, ge=0)
     """lambda_0, 1/s."""
-    initial_gain: float = Field(1e6, gt=0)
-    gain_bound: float = Field(1e7, gt=0)
+    initial_gain: float = Field(1e8, gt=0)
+    gain_bound: float = Field(1e9, gt=0)
     """K_0: forgetting stops where the gain reaches it."""
     initial_inertia: float = 0.0
     initial_viscous_friction: float = 0.0
