@@ -70,18 +70,27 @@ def _identity(file: McapFile) -> tuple[str | None, int]:
 
 
 def _ordered(files: list[McapFile], where: str) -> list[McapFile]:
-    named = [(*_identity(file), file) for file in files]
-    if len(files) > 1 and len({identity for identity, _, _ in named}) > 1:
+    named = sorted(
+        ((*_identity(file), file) for file in files), key=lambda row: (row[1], row[2].path)
+    )
+    fault = _mixture([(identity, index) for identity, index, _ in named])
+    if fault:
         names = ", ".join(file.path.name for file in files)
         for file in files:
             file.close()
-        raise SessionError(f"{where} holds files of different recordings ({names}); open one")
-    named.sort(key=lambda row: row[1])
+        raise SessionError(f"{where} holds {fault} ({names}); name the file of one")
     ordered = [file for _, _, file in named]
-    present = [index for _, index, _ in named]
-    missing = sorted(set(range(1, max(present, default=0) + 1)) - set(present))
+    present = {index for _, index, _ in named}
+    missing = sorted(set(range(1, max(present, default=0) + 1)) - present)
     if missing:
         ordered[0].note(
             f"{where}: file {', '.join(map(str, missing))} of the recording is not there"
         )
     return ordered
+
+
+def _mixture(named: list[tuple[str | None, int]]) -> str:
+    if len({identity for identity, _ in named}) > 1:
+        return "files of different recordings"
+    repeated = len(set(named)) < len(named)
+    return "a recording more than once" if repeated and named[0][0] is not None else ""

@@ -14,7 +14,7 @@ from seamlog.mcap.chunks import read_chunk
 from seamlog.mcap.columns import LOG_TIME, STAMP, ChannelDecoder, Columns, column_forms
 from seamlog.mcap.index import FileIndex, load_index
 from seamlog.mcap.json_columns import json_columns
-from seamlog.mcap.message_index import read_message_index
+from seamlog.mcap.message_index import is_plausible, read_message_index
 from seamlog.mcap.records import ChannelRecord, ChunkEntry, Malformed
 from seamlog.mcap.ros2msg import DefinitionError, Node, parse
 from seamlog.mcap.rows import iter_batches, walk_messages
@@ -141,7 +141,7 @@ class McapFile:
     def message_places(self, entry: ChunkEntry, channel_id: int) -> list[tuple[int, int]]:
         """Log time and offset in the unpacked chunk of each message of the channel."""
         rows = read_message_index(self.source, entry, channel_id)
-        if rows is not None:
+        if rows is not None and is_plausible(self.source, entry, channel_id, rows):
             return [(time, offset) for time, offset in rows.tolist()]
         return [
             (int.from_bytes(chunk[offset + 15 : offset + 23], "little"), offset)

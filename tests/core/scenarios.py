@@ -91,9 +91,7 @@ def events_and_paths(path: Path) -> Expected:
     events, seam = CHANNELS["/events"], CHANNELS["/seam/path"]
     kinds, details = [ARC_ON, ARC_OFF, NOTE], ["", "Lichtbogen aus – äöü", "a note"]
     stamps = times(3).tolist()
-    written = [
-        messages.encode(events, row) for row in zip(stamps, kinds, details, strict=True)
-    ]
+    written = [messages.encode(events, row) for row in zip(stamps, kinds, details, strict=True)]
     lines = [np.arange(count, dtype=float) for count in (0, 1, 5, 5, 300)]
     paths = [messages.encode(seam, (int(t), x, -x)) for t, x in zip(times(5), lines, strict=True)]
     with BatchWriter(path) as writer:
@@ -198,7 +196,7 @@ def write_foreign(path: Path, options: Mapping[str, Any]) -> Expected:
             )
             for number, payload in zip(ids, payloads, strict=True):
                 writer.add_message(number, stamp + 3, payload, stamp)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return {
         "/table/encoder": encoder | {"log_time_ns": encoder["stamp_ns"] + 3},
         "/joints": {
@@ -254,7 +252,7 @@ def assert_same(found: Mapping[str, Any], expected: Mapping[str, Any]) -> None:
     for name, values in expected.items():
         column = found[name]
         assert len(column) == len(values), name
-        if getattr(column, "dtype", None) == object:
+        if column.dtype.kind == "O":
             for one, other in zip(column, values, strict=True):
                 assert_value(one, other)
         else:

@@ -77,9 +77,8 @@ def test_what_is_written_is_read(
 def test_columns_that_do_not_fit_leave_no_file(
     tmp_path: Path, change: dict[str, Any], reason: str
 ) -> None:
-    with pytest.raises(UsageError, match=reason):
-        with BatchWriter(tmp_path / "x.mcap") as writer:
-            writer.write("/table/encoder", encoder_columns(4) | change)
+    with pytest.raises(UsageError, match=reason), BatchWriter(tmp_path / "x.mcap") as writer:
+        writer.write("/table/encoder", encoder_columns(4) | change)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -129,10 +128,10 @@ def read(path: Path, expected: Expected) -> None:
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_a_copy_holds_the_same(tmp_path: Path, name: str) -> None:
     expected = SCENARIOS[name](tmp_path / "a.mcap")
-    with BatchWriter(tmp_path / "b.mcap") as writer:
-        with seamlog.open_session(tmp_path / "a.mcap") as session:
+    with seamlog.open_session(tmp_path / "a.mcap") as session:
+        attachments = dict(session.attachments)
+        with BatchWriter(tmp_path / "b.mcap") as writer:
             writer.copy_session(session)
-            attachments = dict(session.attachments)
     read(tmp_path / "b.mcap", expected)
     with seamlog.open_session(tmp_path / "b.mcap") as copy:
         assert dict(copy.attachments) == attachments
@@ -156,7 +155,10 @@ def test_sessions_with_the_same_ids_are_copied_into_one(tmp_path: Path) -> None:
 
 def test_a_window_is_no_session_to_copy(tmp_path: Path) -> None:
     write_live(tmp_path / "a.mcap")
-    with seamlog.open_session(tmp_path / "a.mcap") as session:
-        with pytest.raises(UsageError, match="window"), BatchWriter(tmp_path / "b.mcap") as writer:
-            writer.copy_session(session.window(0, 10))
+    with (
+        seamlog.open_session(tmp_path / "a.mcap") as session,
+        pytest.raises(UsageError, match="window"),
+        BatchWriter(tmp_path / "b.mcap") as writer,
+    ):
+        writer.copy_session(session.window(0, 10))
     assert not (tmp_path / "b.mcap").exists()

@@ -38,8 +38,8 @@ def value_of(base: str) -> st.SearchStrategy[Any]:
 
 
 @st.composite
-def definitions(draw: st.DrawFn) -> list[tuple[str, str, int | None]]:
-    """Fields as (base, array text, fixed count or None)."""
+def definitions(draw: st.DrawFn) -> list[tuple[str, str, int]]:
+    """Fields as (base, array text, count if fixed)."""
     fields = []
     for _ in range(draw(st.integers(1, 6))):
         base = draw(st.sampled_from([*PRIMITIVES, NESTED]))
@@ -56,7 +56,7 @@ def draw_one(draw: st.DrawFn, base: str) -> Any:
 
 
 @st.composite
-def recordings(draw: st.DrawFn) -> tuple[str, list[tuple[str, str, int | None]], list[list[Any]]]:
+def recordings(draw: st.DrawFn) -> tuple[str, list[tuple[str, str, int]], list[list[Any]]]:
     fields = draw(definitions())
     lines = [f"{base}{array} f{place}" for place, (base, array, _) in enumerate(fields)]
     text = "\n".join(lines) + "\n" + "=" * 80 + f"\nMSG: {NESTED}\n{INNER}"
@@ -68,7 +68,7 @@ def recordings(draw: st.DrawFn) -> tuple[str, list[tuple[str, str, int | None]],
                 row.append(draw_one(draw, base))
                 continue
             wanted = count if array == f"[{count}]" else draw(st.integers(0, 3))
-            row.append([draw_one(draw, base) for _ in range(wanted or 0)])
+            row.append([draw_one(draw, base) for _ in range(wanted)])
         rows.append(row)
     return text, fields, rows
 
@@ -90,13 +90,13 @@ def write_recording(path: Path, text: str, payloads: list[bytes]) -> None:
         channel = writer.register_channel("/x", "cdr", schema)
         for time, payload in enumerate(payloads):
             writer.add_message(channel, time, payload, time)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 @settings(max_examples=120, deadline=None)
 @given(recordings())
 def test_any_message_decodes_as_it_was_encoded(
-    recording: tuple[str, list[tuple[str, str, int | None]], list[list[Any]]],
+    recording: tuple[str, list[tuple[str, str, int]], list[list[Any]]],
 ) -> None:
     text, fields, rows = recording
     store = get_typestore(Stores.EMPTY)
@@ -170,9 +170,11 @@ def test_a_message_that_does_not_fit_its_definition_is_refused(
     tmp_path: Path, text: str, payload: bytes
 ) -> None:
     write_recording(tmp_path / "x.mcap", text, [payload])
-    with seamlog.open_session(tmp_path / "x.mcap") as session:
-        with pytest.raises(SessionError, match=r"x\.mcap: /x"):
-            session.columns("/x")
+    with (
+        seamlog.open_session(tmp_path / "x.mcap") as session,
+        pytest.raises(SessionError, match=r"x\.mcap: /x"),
+    ):
+        session.columns("/x")
 
 
 def test_constants_comments_and_defaults_are_no_fields() -> None:
