@@ -5,16 +5,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.analysis.axis_record import AxisRecord, FloatArray
+from seamlog.analysis.axis_record import AxisRecord
 from seamlog.analysis.part_tables import Tables
-from seamlog.results import Figure, Finding, Input, Part, Severity
+from seamlog.results import Finding, Input, Part, Severity
 from seamlog.welds import Weld
 
-from .counterfactual import Prediction
-from .run import ControllerRun, Replay
+from .figures import model_misses, replay_figures
+from .run import Replay
 from .settings import ReplaySettings
 from .tables import replay_tables
 
+LARGE_MISS = 0.2
+"""Relative miss of the recorded run from which on the part warns."""
 TOLERANCE = 1e-9
 """Largest difference of commands, relative to the largest command, that counts as reproduced."""
 
@@ -24,11 +26,8 @@ def replay_part(
 ) -> tuple[Part, Tables]:
     """The part `replay` and its tables; errors are judged over the welds, if there are any."""
     judged = judged_rows(found.record, welds)
-    figures = [
-        *_self_check_figures(found),
-        *_recorded_figures(found, judged),
-        *(figure for run in found.controllers for figure in _figures(run, found, judged)),
-    ]
+    figures = replay_figures(found, judged)
+    misses = model_misses(found, judged)
     where = "over the welds" if welds else "over the whole record"
     part = Part(
         part="replay",
@@ -37,8 +36,8 @@ def replay_part(
         inputs=inputs,
         configuration=settings.model_dump(mode="json"),
         figures=figures,
-        findings=_findings(found),
-        details=_details(found),
+        findings=[*_findings(found), *_model_findings(misses)],
+        details=_details(found) | {"model_misses": misses, "members": settings.members},
     )
     return part, replay_tables(found)
 
@@ -49,86 +48,6 @@ def judged_rows(record: AxisRecord, welds: list[Weld]) -> NDArray[np.bool_]:
     for weld in welds:
         rows |= (record.log_time_ns >= weld.start_ns) & (record.log_time_ns < weld.end_ns)
     return rows if rows.any() else np.ones(len(record), dtype=np.bool_)
-
-
-def rms_mm(error_m: FloatArray) -> float:
-    """Root mean square in mm."""
-    return 1e3 * float(np.sqrt(np.mean(error_m**2)))
-
-
-def peak_mm(error_m: FloatArray) -> float:
-    """Largest magnitude in mm."""
-    return 1e3 * float(np.max(np.abs(error_m)))
-
-
-def _error_figures(
-    name: str, label: str, prediction: Prediction | None, judged: NDArray[np.bool_], reason: str
-) -> list[Figure]:
-    figures = []
-    for kind, judge in (("rms", rms_mm), ("peak", peak_mm)):
-        value, u = prediction.figure(judge, judged) if prediction else (None, None)
-        figures.append(
-            Figure(
-                name=f"{name}_{kind}_error_mm",
-                label=f"{kind} tracking error, {label}",
-                value=value,
-                unit="mm",
-                u=u,
-                reason="" if prediction else reason,
-            )
-        )
-    return figures
-
-
-def _figures(run: ControllerRun, found: Replay, judged: NDArray[np.bool_]) -> list[Figure]:
-    name = run.choice.name
-    reason = found.model_reason or "only a shadow replay was asked for: it predicts no error"
-    return _error_figures(name, f"{name} (counterfactual)", run.prediction, judged, reason)
-
-
-def _recorded_figures(found: Replay, judged: NDArray[np.bool_]) -> list[Figure]:
-    error = found.record.error_m[judged]
-    measured = [
-        Figure(
-            name=f"recorded_{kind}_error_mm",
-            label=f"{kind} tracking error, recorded",
-            value=judge(error),
-            unit="mm",
-        )
-        for kind, judge in (("rms", rms_mm), ("peak", peak_mm))
-    ]
-    if found.recorded is None:
-        return measured
-    label = "recorded controller as the model predicts it"
-    return measured + _error_figures("recorded_predicted", label, found.recorded, judged, "")
-
-
-def _self_check_figures(found: Replay) -> list[Figure]:
-    check, unit = found.self_check, found.record.drive.unit
-    position = check.position_difference_m
-    return [
-        Figure(
-            name="self_check_shadow_difference",
-            label="self-check: recorded controller on recorded measurements, largest difference",
-            value=check.shadow_difference,
-            unit=unit,
-            reason="" if check.shadow_difference is not None else check.reason,
-        ),
-        Figure(
-            name="self_check_command_difference",
-            label="self-check: commands after abduction, largest difference",
-            value=check.command_difference,
-            unit=unit,
-            reason="" if check.command_difference is not None else check.reason,
-        ),
-        Figure(
-            name="self_check_position_difference_mm",
-            label="self-check: measured positions after abduction, largest difference",
-            value=None if position is None else 1e3 * position,
-            unit="mm",
-            reason="" if position is not None else check.reason,
-        ),
-    ]
 
 
 def _findings(found: Replay) -> list[Finding]:
@@ -146,6 +65,17 @@ def _findings(found: Replay) -> list[Finding]:
         messages.append((Severity.WARNING, f"no counterfactual: {found.model_reason}"))
     messages += _self_check_messages(found)
     return [Finding(severity=severity, message=text) for severity, text in messages]
+
+
+def _model_findings(misses: dict[str, float] | None) -> list[Finding]:
+    """How far the model may be trusted, in words."""
+    if misses is None or max(misses.values()) <= LARGE_MISS:
+        return []
+    text = (
+        f"the model misses the recorded run: rms by {100 * misses['rms']:.0f} %, peak by "
+        f"{100 * misses['peak']:.0f} %; take its predictions as no better than that"
+    )
+    return [Finding(severity=Severity.WARNING, message=text)]
 
 
 def _self_check_messages(found: Replay) -> list[tuple[Severity, str]]:

@@ -17,9 +17,9 @@ from seamlog.analysis.dynamics import Ripple, StribeckPlant
 from seamlog.analysis.estimators.gated_rls import GatedRLS, GatedRLSConfig
 from seamlog.analysis.replay.abduction import abduce, reproduce
 from seamlog.analysis.replay.counterfactual import make_scene, predict
+from seamlog.analysis.replay.figures import rms_mm
 from seamlog.analysis.replay.inputs import replay_inputs
 from seamlog.analysis.replay.model import identify_model
-from seamlog.analysis.replay.part import rms_mm
 from seamlog.analysis.replay.shadow import shadow_controller, shadow_estimator
 from seamlog.cli import run
 from seamlog.contracts import Axis, Controller
