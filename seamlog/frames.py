@@ -14,7 +14,8 @@ from seamlog.errors import FrameMissing, SessionError
 from seamlog.limits import LIMITS, Limits
 from seamlog.mcap.chunks import read_chunk
 from seamlog.mcap.file import McapFile
-from seamlog.mcap.records import ChannelRecord, ChunkEntry, Cursor, Malformed
+from seamlog.mcap.parsing import Cursor
+from seamlog.mcap.records import ChannelRecord, ChunkEntry, Malformed
 from seamlog.mcap.rows import PAYLOAD
 from seamlog.pictures import decode_picture
 

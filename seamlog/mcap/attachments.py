@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from seamlog.errors import LimitExceeded, SessionError, UnknownName
 from seamlog.limits import Limits
-from seamlog.mcap import records
+from seamlog.mcap import parsing, records
 from seamlog.mcap.records import AttachmentEntry, Malformed
 from seamlog.mcap.source import FileSource
 
@@ -39,7 +39,7 @@ def read_attachment(source: FileSource, entry: AttachmentEntry, limits: Limits) 
 
 
 def _parsed(content: memoryview) -> Attachment:
-    cursor = records.Cursor(content)
+    cursor = parsing.Cursor(content)
     log_time, create_time = cursor.u64(), cursor.u64()
     name, media_type = cursor.string(), cursor.string()
     data = cursor.take(cursor.u64())

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seamlog.errors import SessionError, UnknownName
 from seamlog.limits import LIMITS, Limits
-from seamlog.mcap import records
+from seamlog.mcap import parsing, records
 from seamlog.mcap.chunks import read_chunk
 from seamlog.mcap.columns import LOG_TIME, STAMP, ChannelDecoder, Columns, column_forms
 from seamlog.mcap.index import FileIndex, load_index
@@ -161,7 +161,7 @@ class McapFile:
         for entry in self.index.metadata:
             try:
                 content = self.source.content(entry.offset, entry.length, records.METADATA)
-                yield records.parse_metadata(content)
+                yield parsing.parse_metadata(content)
             except Malformed as error:
                 self.note(
                     f"{self.path}: metadata {entry.name!r} at byte {entry.offset} is damaged "

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from seamlog.errors import SessionError
 from seamlog.limits import LIMITS, Limits
-from seamlog.mcap import records
+from seamlog.mcap import parsing, records
 from seamlog.mcap.records import (
     AttachmentEntry,
     ChannelRecord,
@@ -36,19 +36,19 @@ class FileIndex:
     def learn(self, opcode: int, content: memoryview) -> None:
         """Take in a schema, channel or index record."""
         if opcode == records.SCHEMA:
-            schema = records.parse_schema(content)
+            schema = parsing.parse_schema(content)
             self.schemas.setdefault(schema.id, schema)
         elif opcode == records.CHANNEL:
-            channel = records.parse_channel(content)
+            channel = parsing.parse_channel(content)
             self.channels.setdefault(channel.id, channel)
         elif opcode == records.CHUNK_INDEX:
-            self.chunks.append(records.parse_chunk_index(content))
+            self.chunks.append(parsing.parse_chunk_index(content))
         elif opcode == records.ATTACHMENT_INDEX:
-            self.attachments.append(records.parse_attachment_index(content))
+            self.attachments.append(parsing.parse_attachment_index(content))
         elif opcode == records.METADATA_INDEX:
-            self.metadata.append(records.parse_metadata_index(content))
+            self.metadata.append(parsing.parse_metadata_index(content))
         elif opcode == records.STATISTICS:
-            self.statistics = records.parse_statistics(content)
+            self.statistics = parsing.parse_statistics(content)
 
 
 def load_index(source: FileSource, limits: Limits = LIMITS) -> FileIndex:
@@ -84,7 +84,7 @@ def read_header(source: FileSource) -> tuple[str, str]:
         for opcode, offset, length in walk(source.data, at, source.size):
             if opcode != records.HEADER:
                 break
-            return records.parse_header(source.content(offset, length, opcode))
+            return parsing.parse_header(source.content(offset, length, opcode))
         raise Malformed("no header record")
     except Malformed as error:
         raise SessionError(
@@ -113,7 +113,7 @@ def _summary_start(source: FileSource) -> int:
     if data[end:] != records.MAGIC:
         raise Malformed("it does not end with the magic bytes of MCAP")
     foot = source.content(end - records.FOOTER_BYTES, records.FOOTER_BYTES, records.FOOTER)
-    start = records.Cursor(foot).u64()
+    start = parsing.Cursor(foot).u64()
     if start and not len(records.MAGIC) <= start <= end - records.FOOTER_BYTES:
         raise Malformed(f"its footer points outside the file, at byte {start}")
     return start
@@ -124,7 +124,7 @@ def _read_summary(source: FileSource, start: int, index: FileIndex, limits: Limi
     if end - start > limits.summary_bytes:
         raise Malformed(f"{end - start} bytes are more than summary_bytes = {limits.summary_bytes}")
     data = source.data
-    stored = records.Cursor(data, source.size - len(records.MAGIC) - 4).u32()
+    stored = parsing.Cursor(data, source.size - len(records.MAGIC) - 4).u32()
     if stored and zlib.crc32(data[start : source.size - len(records.MAGIC) - 4]) != stored:
         raise Malformed("its CRC is wrong")
     for opcode, offset, length in walk(data, start, end):

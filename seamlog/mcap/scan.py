@@ -8,7 +8,7 @@ import struct
 from collections.abc import Mapping
 
 from seamlog.limits import Limits
-from seamlog.mcap import records
+from seamlog.mcap import parsing, records
 from seamlog.mcap.chunks import BARE, read_chunk
 from seamlog.mcap.index import FileIndex, read_header, walk
 from seamlog.mcap.records import ChunkEntry, Malformed
@@ -88,7 +88,7 @@ class _Scanner:
         elif opcode == records.ATTACHMENT:
             self.index.attachments.append(_attachment(offset, length, content))
         elif opcode == records.METADATA:
-            name, _ = records.parse_metadata(content)
+            name, _ = parsing.parse_metadata(content)
             self.index.metadata.append(records.MetadataEntry(offset, length, name))
 
     def _take_message_index(self, offset: int, length: int, content: memoryview) -> None:
@@ -157,7 +157,7 @@ class _Scanner:
 
 
 def _entry(offset: int, length: int, content: memoryview) -> ChunkEntry:
-    head = records.parse_chunk_head(content)
+    head = parsing.parse_chunk_head(content)
     if head.data_offset + head.data_size != len(content):
         raise Malformed("a chunk's data does not fill its record")
     return ChunkEntry(
@@ -174,7 +174,7 @@ def _entry(offset: int, length: int, content: memoryview) -> ChunkEntry:
 
 
 def _attachment(offset: int, length: int, content: memoryview) -> records.AttachmentEntry:
-    cursor = records.Cursor(content)
+    cursor = parsing.Cursor(content)
     log_time, create_time = cursor.u64(), cursor.u64()
     name, media_type = cursor.string(), cursor.string()
     return records.AttachmentEntry(
