@@ -89,7 +89,11 @@ def _outcome(
 ) -> Outcome:
     seconds = _duration_s(topics)
     head = f"{file} -> {output}" if output else f"{file}: dry run, nothing written"
-    lines = [head, f"{loss.rows} rows, {seconds:.3f} s, topics {', '.join(topics)}"]
+    first_ns = int(next(iter(topics.values())).columns["stamp_ns"][0])
+    lines = [
+        head,
+        f"{loss.rows} rows, {seconds:.3f} s from {_date(first_ns)}, topics {', '.join(topics)}",
+    ]
     if loss.not_imported:
         lines.append(f"not imported: {', '.join(loss.not_imported)}")
     lines += [f"absent in {topic}: {', '.join(names)}" for topic, names in loss.absent.items()]
@@ -99,12 +103,19 @@ def _outcome(
         "session": str(output) if output else None,
         "rows": loss.rows,
         "duration_s": seconds,
+        "start_ns": first_ns,
         "topics": list(topics),
         "not_imported": loss.not_imported,
         "absent": loss.absent,
         "missing_values": loss.missing_values,
     }
     return Outcome("seamlog.import", "\n".join(lines), document)
+
+
+def _date(time_ns: int) -> str:
+    from datetime import UTC, datetime
+
+    return f"{datetime.fromtimestamp(time_ns // 1_000_000_000, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def _duration_s(topics: Mapping[str, "TopicColumns"]) -> float:

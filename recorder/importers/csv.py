@@ -1,4 +1,4 @@
-"""Text tables with a header line: comma, semicolon or tab between columns."""
+"""Text tables: comma, semicolon or tab between columns, a header line or none."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +10,11 @@ from seamlog.errors import ImportFailed
 
 
 class CsvImporter:
-    """Reads a `.csv` file; columns are named by the header line, cells without a number are NaN."""
+    """Reads a `.csv` file; cells without a number are NaN.
+
+    Columns are named by the header line; where the first line is numbers already, by their place:
+    `column 1`, `column 2` and so on.
+    """
 
     def load(self, path: Path) -> Mapping[str, NDArray[Any]]:
         """All columns that hold numbers; `ImportFailed` if there is no table."""
@@ -18,17 +22,23 @@ class CsvImporter:
 
         with path.open(encoding="utf-8", errors="replace") as file:
             header = file.readline()
+        separator = _separator(header)
+        named = not _all_numbers(header, separator)
         try:
-            table = pd.read_csv(path, sep=_separator(header), skipinitialspace=True)
+            table = pd.read_csv(
+                path, sep=separator, skipinitialspace=True, header=0 if named else None
+            )
         except (ValueError, pd.errors.ParserError) as error:
             raise ImportFailed(f"{path} cannot be read as a table: {error}") from error
+        if not named:
+            table.columns = pd.Index([f"column {place + 1}" for place in range(table.shape[1])])
         numbers = table.apply(pd.to_numeric, errors="coerce")
         columns = {str(name).strip(): numbers[name].to_numpy() for name in numbers}
         found = {name: column for name, column in columns.items() if (column == column).any()}
         if not found or len(table) == 0:
             raise ImportFailed(
-                f"{path} has no column of numbers below a header line; put the names of the "
-                "columns into its first line"
+                f"{path} has no column of numbers; it must be a table with one row per moment, "
+                "the names of its columns in the first line"
             )
         return found
 
@@ -36,3 +46,10 @@ class CsvImporter:
 def _separator(header: str) -> str:
     """The separator that the header line has most of."""
     return max(",;\t", key=header.count)
+
+
+def _all_numbers(line: str, separator: str) -> bool:
+    try:
+        return all(float(cell) == float(cell) for cell in line.split(separator))
+    except ValueError:
+        return False

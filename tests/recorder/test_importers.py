@@ -192,6 +192,16 @@ def test_csv_columns_are_named_by_the_header(tmp_path: Path, separator: str) -> 
     np.testing.assert_array_equal(columns["x"], [1.0, np.nan])
 
 
+def test_a_csv_without_header_numbers_its_columns(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("0.0, 5, 6\n0.1, 7, 8\n")
+    columns = CsvImporter().load(tmp_path / "t.csv")
+    assert {name: list(column) for name, column in columns.items()} == {
+        "column 1": [0.0, 0.1],
+        "column 2": [5, 7],
+        "column 3": [6, 8],
+    }
+
+
 @pytest.mark.parametrize("text", ["", "a,b\n", "a,b\nx,y\n"])
 def test_a_csv_without_numbers_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "t.csv").write_text(text)
