@@ -1,8 +1,10 @@
 """A part of the results as blocks, the same way for every kind."""
 
+import math
 from collections.abc import Callable, Collection, Sequence
+from typing import Any
 
-from seamlog.results import Part
+from seamlog.results import Figure, Part
 
 from .content import (
     AnyBlock,
@@ -11,11 +13,14 @@ from .content import (
     Findings,
     Heading,
     Notice,
+    Table,
 )
 from .pictures import picture_block
-from .plots import plots_of
+from .plots import AXES, plots_of, split_unit
 from .run import KINDS, Run
 from .verdicts import statement
+
+_MOST_ROWS = 100
 
 PartMaker = Callable[[Run, Part], Sequence[AnyBlock]]
 
@@ -51,6 +56,7 @@ def part_blocks(run: Run, part: Part) -> list[AnyBlock]:
         *pictures(run, part),
         *figures(part),
         *criteria(run, part),
+        *tables(run, part),
     ]
 
 
@@ -82,6 +88,37 @@ def plots(run: Run, part: Part, leave_out: Collection[str] = ()) -> list[AnyBloc
     return [
         plot for name in part.tables if name not in leave_out for plot in plots_of(run, part, name)
     ]
+
+
+def tables(run: Run, part: Part, leave_out: Collection[str] = ()) -> list[AnyBlock]:
+    """Tables that run along neither time nor seam, as text."""
+    return [
+        _as_text(run, part, name)
+        for name, table in part.tables.items()
+        if name not in leave_out and not set(AXES) & set(table.columns)
+    ]
+
+
+def _as_text(run: Run, part: Part, name: str) -> Table:
+    """The first column names the rows; long tables are cut, and say so."""
+    columns, units = run.columns(part, name), part.tables[name].columns
+    first, *others = columns
+    count = part.tables[name].rows
+    cut = f", first {_MOST_ROWS} of {count} rows" if count > _MOST_ROWS else ""
+    rows = [
+        (str(columns[first][row]), [_cell(other, columns[other][row], units) for other in others])
+        for row in range(min(count, _MOST_ROWS))
+    ]
+    header = [split_unit(column)[0] for column in columns]
+    return Table(caption=f"{part.title}: {name}{cut}", header=header, rows=rows)
+
+
+def _cell(name: str, value: Any, units: dict[str, str]) -> Figure | None:
+    plain = value.item() if hasattr(value, "item") else value
+    if plain is None or (isinstance(plain, float) and not math.isfinite(plain)):
+        return None
+    shown = str(plain) if isinstance(plain, bool) else plain
+    return Figure(name=name, label=name, value=shown, unit=units.get(name, ""))
 
 
 def pictures(run: Run, part: Part, leave_out: Collection[str] = ()) -> list[AnyBlock]:

@@ -7,7 +7,7 @@ import numpy as np
 from seamlog.results import Part
 
 from .content import AnyBlock, Column, Notice, PictureBlock, Track
-from .run import Run
+from .run import Run, anchor
 
 MEDIA_TYPES = {
     ".webp": "image/webp",
@@ -31,7 +31,7 @@ def picture_block(run: Run, part: Part, name: str, track: Track | None = None) -
     if picture.width_px > _WIDEST_PX or len(image) > _MOST_BYTES:
         image, media_type = _reduced(image, media_type)
     return PictureBlock(
-        id=f"picture-{run.index}-{part.stem}-{name}".replace(".", "-"),
+        id=anchor("picture", str(run.index), part.stem, name),
         caption=picture.caption,
         alt=picture.caption or f"{part.title}: {name}",
         media_type=media_type,

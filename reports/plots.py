@@ -1,8 +1,8 @@
 """Tables to plots by one rule: `stamp_ns` makes a time plot, `s_mm` a plot along the seam.
 
-Columns of one unit share a plot, errors apart from what they are the error of. `u_<name>` is the
-standard uncertainty of `<name>` and becomes its band of U (k = 2); `band_low_<name>` and
-`band_high_<name>` are the band of the column whose name ends alike.
+Columns of one unit share a plot; errors and residuals stand apart from the larger things they are
+the difference of. `u_<name>` is the standard uncertainty of `<name>` and becomes its band of U
+(k = 2); `band_low_<name>` and `band_high_<name>` are the band of the column whose name ends alike.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,13 @@ from seamlog.results import Part
 
 from .content import Column, Limit, Mark, SeamPlot, Series, TimePlot
 from .numbers import COVERAGE, spelled_unit
-from .run import Run
+from .run import Run, anchor
 
 Columns = dict[str, NDArray[Any]]
-_AXES = ("stamp_ns", "s_mm", "s_px")
+_DIFFERENCES = ("error", "residual")
+"""Endings of what is small beside the things it is the difference of."""
+AXES = ("s_mm", "s_px", "stamp_ns")
+"""Columns that a table can run along, the first it has being its x."""
 _SUFFIXES = {
     "mm": "mm",
     "mm_s": "mm/s",
@@ -49,7 +52,7 @@ def split_unit(name: str) -> tuple[str, str]:
 def plots_of(run: Run, part: Part, table: str, title: str = "") -> list[TimePlot | SeamPlot]:
     """Every plottable column of a table, one plot per unit; a table without axis gives none."""
     units = part.tables[table].columns
-    axis = next((name for name in ("s_mm", "s_px", "stamp_ns") if name in units), None)
+    axis = next((name for name in AXES if name in units), None)
     if axis is None:
         return []
     columns = run.columns(part, table)
@@ -72,12 +75,12 @@ def make_plot(
     """One plot of the columns `names` of a table, over time or along the seam."""
     columns = run.columns(part, table)
     units = part.tables[table].columns
-    axis = next(name for name in ("s_mm", "s_px", "stamp_ns") if name in columns)
+    axis = next(name for name in AXES if name in columns)
     x, ordered = _ordered(run, axis, columns)
     series = [_series(name, units, ordered, single=len(names) == 1) for name in names]
     words = label or ", ".join(dict.fromkeys(s.label for s in series))
     common: dict[str, Any] = {
-        "id": f"plot-{run.index}-{part.stem}-{table}-{names[0]}".replace(".", "-"),
+        "id": anchor("plot", str(run.index), part.stem, table, names[0]),
         "title": title or f"{words[:1].upper()}{words[1:]}",
         "caption": caption,
         "x": Column(values=x),
@@ -138,12 +141,12 @@ def _band(
 def _by_unit(columns: Columns, units: dict[str, str]) -> list[list[str]]:
     groups: dict[str, list[str]] = {}
     for name, values in columns.items():
-        if name in _AXES or name.startswith(("u_", "band_low_", "band_high_")):
+        if name in AXES or name.startswith(("u_", "band_low_", "band_high_")):
             continue
         if values.dtype.kind not in "fiu" or not np.isfinite(values.astype(np.float64)).any():
             continue
         unit = units.get(name) or split_unit(name)[1]
-        own = "error " if split_unit(name)[0].endswith("error") else ""
+        own = "difference " if split_unit(name)[0].endswith(_DIFFERENCES) else ""
         groups.setdefault(own + (unit or name), []).append(name)
     return list(groups.values())
 

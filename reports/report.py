@@ -7,7 +7,6 @@ report.write(Path("report.html"))
 """
 
 import hashlib
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from seamlog.results import Results
 from .content import AnyBlock, Column, Link, Section
 from .page import Document, has_uplot, render
 from .parts import part_blocks
-from .run import KINDS, Run, utc_date
+from .run import KINDS, Run, anchor, utc_date
 from .verdicts import overall
 
 SectionMaker = Callable[[Sequence[Run]], list[AnyBlock] | None]
@@ -69,7 +68,7 @@ class Report:
         return document
 
     def _id(self) -> str:
-        digest = hashlib.sha256(b"".join(run.fingerprint() for run in self._runs))
+        digest = hashlib.sha256(b"".join(run.fingerprint for run in self._runs))
         return digest.hexdigest()[:16]
 
     def _end(self) -> str | None:
@@ -93,7 +92,7 @@ class Report:
         kinds = dict.fromkeys(p.part for run in self._runs for p in run.parts)
         return [
             Section(
-                name=_anchor(kind),
+                name=anchor(kind),
                 title=kind.replace("_", " ").capitalize(),
                 blocks=[b for run in self._runs for p in run.of(kind) for b in part_blocks(run, p)],
             )
@@ -102,15 +101,10 @@ class Report:
         ]
 
 
-def _anchor(name: str) -> str:
-    """A name that can stand in an address: letters, digits, hyphens."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-") or "part"
-
-
 def _links(run: Run) -> list[Link]:
-    """Seam and time tied together by the tables of the join."""
+    """Seam and time tied together by tables that hold both, the join before the log alone."""
     links = []
-    for part in run.of("join"):
+    for part in sorted(run.parts, key=lambda part: part.part != "join"):
         for name, table in part.tables.items():
             if {"s_mm", "stamp_ns"} <= set(table.columns):
                 columns = run.columns(part, name)

@@ -1,6 +1,7 @@
 """One results directory as the report sees it: parts, tables, its time line and its places."""
 
 import hashlib
+import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.errors import ResultsError
-from seamlog.results import Finding, Part, Place, Results
+from seamlog.results import Finding, Part, Place, Results, TableFile
 
 from .content import FindingLine, PlaceLink
 from .numbers import format_number
@@ -25,6 +26,10 @@ KINDS = {
 }
 """Parts a whole analysis writes, in the order of the report, and what people call them."""
 
+_LONGEST_ANCHOR = 80
+_ON_BEAD = ("bead", "join")
+"""Parts whose places are looked up on the bead."""
+
 
 class Run:
     """One results directory, read once; `index` counts the directories of the report."""
@@ -33,7 +38,11 @@ class Run:
         self.results = results
         self.index = index
         self.parts = results.parts()
+        self.fingerprint = self._read()
         self._columns: dict[tuple[str, str], dict[str, NDArray[Any]]] = {}
+        self._joined = {
+            part.weld or part.index for part in self.of("join") if _has_places(part.tables)
+        }
         self.label = self._label()
         self.origin_ns = self._origin_ns()
 
@@ -59,9 +68,15 @@ class Run:
         """Name of the axis that all time plots of this run share."""
         return f"{self.index}/time"
 
-    def seam_domain(self, part: Part) -> str:
-        """Name of the axis along the bead of `part`; one per weld, or per photo without one."""
-        return f"{self.index}/seam/{part.weld or part.index}"
+    def seam_domain(self, part: Part, weld: int | None = None) -> str:
+        """Name of the axis along the seam of `part`'s weld.
+
+        A photo has an axis of its own until a join says which place of the seam is which of its.
+        """
+        number = weld or part.weld or part.index
+        if part.part == "bead" and number not in self._joined:
+            return f"{self.index}/photo/{part.index}"
+        return f"{self.index}/seam/{number}"
 
     def end_ns(self) -> int | None:
         """End of the weld or recording as the parts state it; None if none does."""
@@ -76,18 +91,17 @@ class Run:
         """Where a finding of `part` is, as something to jump to."""
         if place is None or (place.s_mm is None and place.time_ns is None):
             return None
-        words = []
+        words, seconds = [], None
         if place.s_mm is not None:
             words.append(f"s = {format_number(place.s_mm, 1)} mm")
-        seconds = None
         if place.time_ns is not None:
             seconds = float(self.seconds(np.array([place.time_ns]))[0])
             words.append(f"t = {format_number(seconds, 2)} s")
-        if place.s_mm is not None:
-            domain = f"{self.index}/seam/{place.weld or part.weld or part.index}"
-            return PlaceLink(text=", ".join(words), section="bead", domain=domain, x=place.s_mm)
-        section = part.part if part.part in KINDS else "tracking"
-        return PlaceLink(text=", ".join(words), section=section, domain=self.time_domain, x=seconds)
+        domain, x = self.time_domain, seconds
+        if place.s_mm is not None and (seconds is None or part.part in _ON_BEAD):
+            domain, x = self.seam_domain(part, place.weld), place.s_mm
+        section = "bead" if part.part in _ON_BEAD else part.part
+        return PlaceLink(text=", ".join(words), section=anchor(section), domain=domain, x=x)
 
     def lines(self, part: Part, findings: Iterable[Finding]) -> list[FindingLine]:
         """Findings of `part` with places to jump to."""
@@ -96,7 +110,7 @@ class Run:
             for f in findings
         ]
 
-    def fingerprint(self) -> bytes:
+    def _read(self) -> bytes:
         """SHA-256 over all parts; refuses files that were changed after the analysis."""
         digest = hashlib.sha256()
         for part in self.parts:
@@ -127,6 +141,19 @@ class Run:
             if (stamps := self.columns(part, name)["stamp_ns"]).size
         ]
         return min(firsts, default=0)
+
+
+def _has_places(tables: dict[str, TableFile]) -> bool:
+    return any({"s_mm", "stamp_ns"} <= set(table.columns) for table in tables.values())
+
+
+def anchor(*names: str) -> str:
+    """A name that can stand in an address; what cannot is replaced, and told apart by a hash."""
+    raw = "-".join(names)
+    plain = re.sub(r"[^A-Za-z0-9_]+", "-", raw).strip("-")[:_LONGEST_ANCHOR]
+    if plain == re.sub(r"[ .]", "-", raw):
+        return plain
+    return f"{plain or 'x'}-{hashlib.sha256(raw.encode()).hexdigest()[:8]}"
 
 
 def utc_date(time_ns: int) -> str:

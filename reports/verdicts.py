@@ -6,7 +6,7 @@ from seamlog.results import Criterion, Part, Severity, Verdict, worst
 
 from .content import Banner, FindingLine, Statement
 from .numbers import format_quantity
-from .run import KINDS, Run
+from .run import KINDS, Run, anchor
 
 _ASSESSED = (Verdict.PASS, Verdict.FAIL)
 
@@ -88,7 +88,7 @@ def statement(part: Part, prefix: str = "") -> Statement:
     if not reason and part.verdict is Verdict.NOT_ASSESSED and not part.criteria:
         reason = "No limits were given."
     return Statement(
-        subject=prefix + part.title, verdict=part.verdict, reason=reason, section=part.part
+        subject=prefix + part.title, verdict=part.verdict, reason=reason, section=anchor(part.part)
     )
 
 

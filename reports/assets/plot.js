@@ -6,21 +6,34 @@ const FONT = "12px system-ui, sans-serif";
 /* A point of a curve with as many decimals as its series allows. */
 function quantityText(value, expanded, series) {
   if (value === null || value === undefined) return "no value";
+  const shown = (number) => number.toFixed(series.decimals).replace(/^-(?=[0.]*$)/, "");
   const text = series.band_label.startsWith("±") && expanded !== null
-    ? `${value.toFixed(series.decimals)} ± ${expanded.toFixed(series.decimals)}`
-    : value.toFixed(series.decimals);
+    ? `${shown(value)} ± ${shown(expanded)}`
+    : shown(value);
   return `${text} ${series.unit}`.trim().replaceAll("-", "−");
 }
 
-function seriesOf(spec) {
+/* Values with no neighbour to be joined to, which only a dot can show. */
+function alone(u, index) {
+  const column = u.data[index];
+  const [first, last] = u.series[0].idxs;
+  const found = [];
+  for (let i = first; i <= last; i++) {
+    if (column[i] !== null && (column[i - 1] ?? null) === null && (column[i + 1] ?? null) === null) found.push(i);
+  }
+  return found;
+}
+
+function seriesOf(spec, data) {
   const list = [{ label: spec.x_label }];
   const bands = [], places = [];
   spec.series.forEach((series, i) => {
     const stroke = () => colour(`--c${i + 1}`);
     const paths = series.step ? uPlot.paths.stepped({ align: 1 }) : undefined;
-    const points = { show: false };
     places.push(list.length);
-    list.push({ label: series.label, stroke, width: 1.5, paths, points, spanGaps: false });
+    const points = { show: false };
+    const dots = Array.isArray(data[list.length]) ? { show: true, size: 3, filter: alone } : points;
+    list.push({ label: series.label, stroke, width: 1.5, paths, points: dots, spanGaps: false });
     if (series.low && series.high) {
       const edge = { stroke: "transparent", width: 0, points, auto: false };
       list.push({ ...edge, label: "high" }, { ...edge, label: "low" });
@@ -104,7 +117,7 @@ function rangeOf(spec, bands) {
 async function makePlot(figure, spec, read, bus) {
   const data = await dataOf(spec, read);
   if (data[0].length < 2) return null;
-  const { list, bands, places } = seriesOf(spec);
+  const { list, bands, places } = seriesOf(spec, data);
   const height = spec.compact ? STRIP_HEIGHT : PLOT_HEIGHT;
   const box = figure.querySelector(".live");
   const now = figure.querySelectorAll(".now");

@@ -6,7 +6,7 @@ import numpy as np
 
 from seamlog.reports.content import AnyBlock, Histogram, Limit, SeamPlot, TimePlot
 from seamlog.reports.numbers import format_quantity
-from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots
+from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
 from seamlog.reports.pictures import picture_block, toe_track
 from seamlog.reports.plots import make_plot, split_unit
 from seamlog.reports.run import Run
@@ -33,6 +33,7 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
         *findings(run, part),
         *figures(part),
         *plots(run, part, leave_out=(_STATIONS,)),
+        *tables(run, part),
         *pictures(run, part, leave_out=(_OVERLAY,)),
     ]
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from seamlog.reports.content import AnyBlock, Table
-from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots
+from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
 from seamlog.reports.run import Run
 from seamlog.reports.verdicts import statement
 from seamlog.results import Figure, Part
@@ -22,6 +22,7 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
         *_comparison(part),
         *findings(run, part),
         *plots(run, part),
+        *tables(run, part),
         *pictures(run, part),
         *criteria(run, part),
     ]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from seamlog.reports.content import AnyBlock, Text
-from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots
+from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
 from seamlog.reports.run import Run
 from seamlog.reports.verdicts import statement
 from seamlog.results import Part
@@ -25,6 +25,7 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
         statement(part),
         *findings(run, part),
         *plots(run, part),
+        *tables(run, part),
         *pictures(run, part),
         *figures(part),
         *criteria(run, part),

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seamlog.reports.content import AnyBlock, Table
-from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots
+from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
 from seamlog.reports.plots import make_plot
 from seamlog.reports.run import Run
 from seamlog.reports.verdicts import statement
@@ -33,6 +33,7 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
         *figures(part, leave_out=named),
         *criteria(run, part),
         *plots(run, part, leave_out=together),
+        *tables(run, part),
         *pictures(run, part),
     ]
 

@@ -9,8 +9,8 @@ from seamlog.results import Figure, Severity
 
 _KEYS = (
     ("bead", ("width_mean_mm", "width_std_mm", "width_range_mm", "width_mean_px", "width_std_px")),
-    ("tracking", ("error_rms_mm", "error_peak_mm")),
-    ("health", ("dropped", "lost")),
+    ("tracking", ("rms_error_mm", "peak_error_mm")),
+    ("health", ("dropped",)),
 )
 """Figures for the first screen, those that are there; a kind with none of them shows its first."""
 _RANKS = {Severity.FAULT: 0, Severity.WARNING: 1, Severity.INFO: 2}

@@ -68,6 +68,11 @@ def _figure(name: str, label: str, value: Any, unit: str = "", u: float | None =
 
 
 def _write_health(results: Results) -> None:
+    channels = {
+        "topic": np.array(["/table/encoder", "/events"], dtype=object),
+        "count": np.array([1350, 4]),
+        "period_s": np.array([0.04, np.nan]),
+    }
     results.write(
         Part(
             part="health",
@@ -93,7 +98,8 @@ def _write_health(results: Results) -> None:
                 "end_ns": int(stamps(np.array([WELD_START_S + 34.0]))[0]),
                 "metadata": {"wps": "WPS-135-07", "material": "S235JR", "process": "135 (MAG)"},
             },
-        )
+        ),
+        tables={"channels": (channels, {"period_s": "s"})},
     )
 
 
@@ -117,8 +123,8 @@ def _write_tracking(results: Results, weld: dict[str, Floats]) -> None:
             verdict=Verdict.NOT_ASSESSED,
             reason="no limit on the tracking error was given",
             figures=[
-                _figure("error_rms_mm", "Tracking error, rms", rms, "mm", 0.004),
-                _figure("error_peak_mm", "Tracking error, peak", 0.412, "mm", 0.02),
+                _figure("rms_error_mm", "rms tracking error", rms, "mm", 0.004),
+                _figure("peak_error_mm", "peak tracking error", 0.412, "mm", 0.02),
             ],
         ),
         tables={"error": (error, units), "speed": (speed, {"weld_speed_mm_s": "mm/s"})},
