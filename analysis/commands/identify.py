@@ -9,7 +9,7 @@ from seamlog.command import command, force_option, output_option, session_argume
 from seamlog.outcome import Outcome
 
 if TYPE_CHECKING:
-    from seamlog.results import Part
+    from seamlog.results import Figure, Part
 
 
 @command("identify")
@@ -78,9 +78,7 @@ def document_of(part: "Part") -> dict[str, Any]:
 def text_of(part: "Part", source: str) -> str:
     """A short table for people."""
     lines = [part.reason]
-    for figure in part.figures:
-        doubt = f" +- {figure.u:.4f}" if figure.u is not None else ""
-        lines.append(f"  {figure.label:<28} {figure.value:12.4f}{doubt} {figure.unit}")
+    lines += [_line(figure) for figure in part.figures]
     rows = part.details["comparison"]
     if rows:
         lines += ["", f"against {source}:"]
@@ -88,6 +86,13 @@ def text_of(part: "Part", source: str) -> str:
     lines += [_comparison(row) for row in rows]
     lines += [f"  {finding.severity.value}: {finding.message}" for finding in part.findings]
     return "\n".join(lines)
+
+
+def _line(figure: "Figure") -> str:
+    if figure.value is None:
+        return f"  {figure.label:<28} not known: {figure.reason}"
+    doubt = f" +- {figure.u:.4f}" if figure.u is not None else ""
+    return f"  {figure.label:<28} {figure.value:12.4f}{doubt} {figure.unit}"
 
 
 def _comparison(row: dict[str, Any]) -> str:

@@ -14,6 +14,8 @@ FEWEST_SHARE = 0.02
 """Least share of the motion that must go the other way."""
 WEAK_CONDITION = 30.0
 """Condition number of the scaled regressor above which the verdict is weak."""
+UNKNOWN_DEVIATION = 0.5
+"""Relative standard deviation of inertia or friction above which no value is stated."""
 WEAK_DEVIATION = 0.1
 """Relative standard deviation of inertia or friction above which the verdict is weak."""
 
@@ -73,13 +75,31 @@ def judge_excitation(found: Identification) -> Excitation:
     )
 
 
-def _vague(found: Identification) -> list[str]:
-    reasons = []
-    for name, value, sd in zip(found.fit.names, found.fit.values, found.fit.sd, strict=True):
-        if name == "offset":
-            continue
+def refused_values(found: Identification) -> dict[str, str]:
+    """Parameters that the record does not tell, although a number came out, each with the reason.
+
+    Inertia and friction at or below 0, or known no better than UNKNOWN_DEVIATION.
+    """
+    refused = {}
+    for name, value, sd in _physical(found):
+        told = f"{value:.4g} +- {sd:.2g}"
         if value <= 0:
-            reasons.append(f"{name} came out as {value:.4g}, which no axis has")
-        elif sd > WEAK_DEVIATION * value:
-            reasons.append(f"{name} is known to {100 * sd / value:.0f} % only")
+            refused[name] = f"came out as {told}, which no axis has: the record does not tell it"
+        elif sd > UNKNOWN_DEVIATION * value:
+            refused[name] = f"came out as {told}: the record does not tell it"
+    return refused
+
+
+def _vague(found: Identification) -> list[str]:
+    refused = refused_values(found)
+    reasons = [f"{name.replace('_', ' ')} {reason}" for name, reason in refused.items()]
+    for name, value, sd in _physical(found):
+        if name not in refused and sd > WEAK_DEVIATION * value:
+            reasons.append(f"{name.replace('_', ' ')} is known to {100 * sd / value:.0f} % only")
     return reasons
+
+
+def _physical(found: Identification) -> list[tuple[str, float, float]]:
+    fit = found.fit
+    rows = zip(fit.names, fit.values.tolist(), fit.sd.tolist(), strict=True)
+    return [row for row in rows if row[0] != "offset"]

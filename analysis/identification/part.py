@@ -11,7 +11,7 @@ from seamlog.analysis.part_tables import Tables
 from seamlog.results import Figure, Finding, Input, Part, Severity
 
 from .compare import Comparison
-from .excitation import Excitation
+from .excitation import Excitation, refused_values
 from .method import SYMMETRIC, Identification, unit_of
 
 Columns = Mapping[str, NDArray[Any]]
@@ -72,18 +72,21 @@ def refused_part(reason: str, inputs: list[Input]) -> Part:
 
 def figures(found: Identification) -> list[Figure]:
     """Parameters with standard uncertainty, then what tells how good the fit is."""
-    fit = found.fit
-    rows = [
-        _figure(name, fit.value(name), fit.deviation(name), unit_of(name, found.unit))
-        for name in fit.names
-    ]
+    fit, refused = found.fit, refused_values(found)
     return [
-        *rows,
+        *(_parameter(found, name, refused.get(name, "")) for name in fit.names),
         _figure("condition_number", fit.condition_number, None, ""),
         _figure("residual_norm", fit.residual_norm, None, found.unit),
         _figure("relative_error", 100 * fit.relative_error, None, "%"),
         _figure("used_share", 100 * found.motion.share, None, "%"),
     ]
+
+
+def _parameter(found: Identification, name: str, refused: str) -> Figure:
+    unit = unit_of(name, found.unit)
+    if refused:
+        return _figure(name, None, None, unit, refused)
+    return _figure(name, found.fit.value(name), found.fit.deviation(name), unit)
 
 
 def _figure(name: str, value: float | None, u: float | None, unit: str, reason: str = "") -> Figure:

@@ -9,9 +9,11 @@ import pytest
 
 from seamlog.analysis.axis_record import AxisRecord, Drive
 from seamlog.analysis.closed_loop import Reference
-from seamlog.analysis.identification.excitation import judge_excitation
+from seamlog.analysis.identification.excitation import Excitation, judge_excitation
 from seamlog.analysis.identification.gated import identify_gated
 from seamlog.analysis.identification.identify import identify_axis
+from seamlog.analysis.identification.method import Identification
+from seamlog.analysis.identification.part import identification_part
 from seamlog.analysis.identification.regression import correlated_least_squares, least_squares
 from seamlog.cli import run
 from seamlog.contracts import Axis
@@ -23,7 +25,9 @@ TRUTH = Axis(1.0, 2.14, 0.214, saturation=20.0, unit="N m")
 
 def line(speed_m_s: float, seconds: float = 30.0) -> Reference:
     time = np.asarray(0.04 * np.arange(round(seconds / 0.04)), dtype=np.float64)
-    return Reference(np.multiply(speed_m_s, time), np.full(len(time), speed_m_s), np.zeros(len(time)))
+    return Reference(
+        np.multiply(speed_m_s, time), np.full(len(time), speed_m_s), np.zeros(len(time))
+    )
 
 
 def test_the_truth_is_found_exactly_without_noise(loop: MakeLoop) -> None:
@@ -125,6 +129,20 @@ def test_weak_motion_is_called_weak(loop: MakeLoop) -> None:
     verdict = judge_excitation(identify_gated(loop(reference=slow, speed_noise_m_s=5e-3)))
     assert verdict.verdict == "weak"
     assert any("inertia" in reason for reason in verdict.reasons)
+
+
+def test_a_value_that_no_axis_has_is_not_stated(loop: MakeLoop) -> None:
+    record = loop()
+    backwards = replace(record, command=-record.command)
+    part, _ = identification_part(*_judged(backwards), [], [])
+    for name in ("inertia", "viscous_friction", "coulomb_friction"):
+        figure = part.figure(name)
+        assert figure is not None and figure.value is None and "no axis has" in figure.reason
+
+
+def _judged(record: AxisRecord) -> tuple[Identification, str, Excitation]:
+    found, why = identify_axis(record)
+    return found, why, judge_excitation(found)
 
 
 def test_a_reference_with_faults_lists_them(
