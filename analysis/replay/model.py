@@ -6,6 +6,7 @@ import numpy as np
 
 from seamlog.analysis.axis_record import AxisRecord, FloatArray
 from seamlog.analysis.dynamics import CoulombPlant, Plant, StribeckPlant
+from seamlog.analysis.identification.excitation import refused_values
 from seamlog.analysis.identification.gated import USUAL_DELAY
 from seamlog.analysis.identification.identify import identify_axis
 from seamlog.analysis.live_controller import LiveController
@@ -53,12 +54,10 @@ def identify_model(record: AxisRecord, live: LiveController | None) -> AxisModel
     found, _ = identify_axis(record, delay_periods=delay)
     scale = record.drive.scale
     values = found.fit.values / scale
-    bad = [name for name, value in zip(_NAMES[:3], values, strict=False) if value <= 0]
-    if bad:
-        raise EvidenceError(
-            f"identification gave {', '.join(bad)} at or below 0, which no axis has: there is no "
-            "model to replay on; run 'seamlog identify' for what the record lacks"
-        )
+    refused = refused_values(found)
+    if refused:
+        told = "; ".join(f"{name} {reason}" for name, reason in refused.items())
+        raise EvidenceError(f"there is no model to replay on: {told}")
     axis = Axis(
         **dict(zip(_NAMES, values.tolist(), strict=True)),
         saturation=live.axis.saturation if live else _seen_saturation(record),

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from seamlog.analysis.axis_record import AxisRecord, Drive
 from seamlog.analysis.closed_loop import Reference
@@ -18,6 +20,7 @@ from seamlog.analysis.identification.regression import correlated_least_squares,
 from seamlog.cli import run
 from seamlog.contracts import Axis
 from seamlog.errors import EvidenceError
+from tests.analysis.conftest import record_loop
 
 MakeLoop = Callable[..., AxisRecord]
 TRUTH = Axis(1.0, 2.14, 0.214, saturation=20.0, unit="N m")
@@ -34,6 +37,23 @@ def test_the_truth_is_found_exactly_without_noise(loop: MakeLoop) -> None:
     record = loop(truth=replace(TRUTH, offset=0.05), speed_noise_m_s=0.0)
     fit = identify_gated(record).fit
     np.testing.assert_allclose(fit.values, [1.0, 2.14, 0.214, 0.05], rtol=2e-4)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    inertia=st.floats(0.3, 60.0),
+    viscous_rate_1_s=st.floats(0.2, 5.0),
+    friction_m_s2=st.floats(0.05, 0.4),
+    offset_share=st.floats(-0.5, 0.5),
+)
+def test_any_axis_is_found_exactly_without_noise(
+    inertia: float, viscous_rate_1_s: float, friction_m_s2: float, offset_share: float
+) -> None:
+    friction = inertia * friction_m_s2
+    truth = Axis(inertia, inertia * viscous_rate_1_s, friction, friction * offset_share)
+    fit = identify_gated(record_loop(truth=truth, speed_noise_m_s=0.0)).fit
+    wanted = [truth.inertia, truth.viscous_friction, truth.coulomb_friction, truth.offset]
+    np.testing.assert_allclose(fit.values, wanted, rtol=1e-3, atol=1e-3 * inertia)
 
 
 @pytest.mark.parametrize("seed", range(3))
