@@ -15,8 +15,8 @@ _TUKEY = 4.685
 class SeamPath:
     """Points in the table frame, mm, and the curve x(y) through them.
 
-    A frame whose points lie off the curve by more than a millimetre in the median means that the
-    plate has slipped: the older points are dropped.
+    A picture whose points lie off the curve by more than a millimetre in the median means that the
+    plate has slipped: the older points are moved by as much.
     """
 
     def __init__(self) -> None:
@@ -32,9 +32,10 @@ class SeamPath:
     def add(self, x_mm: Floats, y_mm: Floats) -> None:
         """Take the points of one picture."""
         if self._curve is not None and len(x_mm) >= 5:
-            residual = x_mm - self._curve[0](self._inside(y_mm))
-            if abs(float(np.median(residual))) > _JUMP_MM:
-                self._x_mm = self._y_mm = np.empty(0)
+            slip_mm = float(np.median(x_mm - self._curve[0](self._inside(y_mm))))
+            if abs(slip_mm) > _JUMP_MM:
+                self._x_mm = self._x_mm + slip_mm
+                self.fit()
         self._x_mm = np.concatenate([self._x_mm, x_mm])
         self._y_mm = np.concatenate([self._y_mm, y_mm])
 

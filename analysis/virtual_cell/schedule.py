@@ -16,7 +16,7 @@ TICK_S = 0.02
 RETURN_S = 4.0
 DWELL_S = 1.5
 RAMP_S = 0.6
-RUN_IN_MM = 8.0
+RUN_IN_S = 1.4
 RUN_OUT_S = 1.5
 
 Floats = NDArray[np.float64]
@@ -59,17 +59,18 @@ def make_schedule(
     """The run of one weld."""
     returned_s = identification_s + RETURN_S
     start_s = returned_s + DWELL_S
+    run_in_mm = RUN_IN_S * speed_mm_s
     dip_middle_s = None
     if dip is not None:
-        before_mm = RUN_IN_MM + float(seam.y_at(dip.centre_s_mm))
+        before_mm = run_in_mm + float(seam.y_at(dip.centre_s_mm))
         lost_s = 0.25 * dip.depth * dip.width_s
         dip_middle_s = start_s + 0.5 * RAMP_S + before_mm / speed_mm_s + lost_s
-    limit_s = start_s + RAMP_S + 3.0 * (WELD_LENGTH_MM + RUN_IN_MM) / speed_mm_s
+    limit_s = start_s + RAMP_S + 3.0 * (WELD_LENGTH_MM + run_in_mm) / speed_mm_s
     time_s: Floats = TICK_S * np.arange(round(limit_s / TICK_S), dtype=np.float64)
     speed: Floats = speed_mm_s * np.clip((time_s - start_s) / RAMP_S, 0.0, 1.0)
     if dip is not None and dip_middle_s is not None:
         speed *= _dip(time_s, dip_middle_s, dip)
-    y = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * TICK_S)]) - RUN_IN_MM
+    y = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * TICK_S)]) - run_in_mm
     arc_on_s, arc_off_s = np.interp([0.0, WELD_LENGTH_MM], y, time_s)
     return _ended(
         Schedule(

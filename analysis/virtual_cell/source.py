@@ -21,7 +21,7 @@ class VirtualCellConfig(BaseModel):
     seed: int = Field(1, ge=0)
     identification_s: float = Field(20.0, ge=10.0, le=600.0)
     """Length of the identification run, 100 sin(t) mm."""
-    speed_mm_s: float = Field(6.0, ge=2.0, le=20.0)
+    speed_mm_s: float = Field(6.0, ge=2.0, le=15.0)
     """Travel of the robot while welding."""
     faults: tuple[Fault, ...] = ("speed_dip",)
     """speed_dip: the robot slows to 60 % near s = 120 mm for 2.5 s; dropouts: encoder messages and
