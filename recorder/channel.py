@@ -4,7 +4,6 @@ import os
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +14,16 @@ from seamlog.channels import CAMERA_INFO_SCHEMA, CHANNELS, IMAGE_SCHEMA
 from seamlog.channels import Channel as Row
 from seamlog.clock import Clock
 from seamlog.errors import UsageError
-from seamlog.messages import encode, encode_image, is_fixed, layout
+from seamlog.messages import encode, is_fixed, layout
 
 from .camera_info import encode_camera_info
 from .fixed import RING_BYTES, fixed_put, fixed_ring
 from .folder import OutTray
 from .gate import Gate
+from .pictures import picture_payload
 from .put_source import Put, Stop
 from .ring import Ring, create_ring
-from .varying import VaryingWriter
+from .varying import Encode, VaryingWriter
 
 _FRAME_RING_BYTES = 64 << 20
 _SMALL_FRAME_RING_BYTES = 16 << 20
@@ -147,13 +147,9 @@ def _varying_channel(
     return Channel(row.topic, metadata, writer.put, named, put_frame, writer.stop, gate)
 
 
-def _encoder(row: Row) -> Callable[..., bytes]:
+def _encoder(row: Row) -> Encode:
     if row.schema == IMAGE_SCHEMA:
-        return encode_image
+        return picture_payload
     if row.schema == CAMERA_INFO_SCHEMA:
-        return encode_camera_info
-    return partial(_encode_own, row)
-
-
-def _encode_own(row: Row, *values: Any) -> bytes:
-    return encode(row, values)
+        return lambda *values: (encode_camera_info(*values), b"")
+    return lambda *values: (encode(row, values), b"")

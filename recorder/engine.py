@@ -14,6 +14,7 @@ from .intake import Intake
 from .journal import Journal
 from .mcap_writer import SessionFile
 from .ring import DROPPED, LAST_SYNC_NS
+from .syncing import Syncer
 from .varying_feed import VaryingFeed
 
 _SYNC_S = 0.25
@@ -35,6 +36,8 @@ class Engine:
         self._intake = Intake(folder, self._file)
         self._synced_s = self._status_s = time.monotonic()
         self._retry_s = 0.0
+        self._asked_size = 0
+        self._syncer = Syncer(self._file.descriptor)
         self._is_durable = True
         self._last_sync_ns = 0
         self._step_ns = self._wall_step_ns()
@@ -61,9 +64,11 @@ class Engine:
         """
         try:
             self._persist(self._drain)
+            self._syncer.end()
+            self._sync_all()
             self._persist(lambda: self._sign(ending))
             self._persist(self._file.finish)
-            self._sync_whole()
+            self._sync_all()
             self._take_name()
             shutil.rmtree(self._folder, ignore_errors=True)
         except OSError as error:
@@ -80,8 +85,7 @@ class Engine:
         urgent = [feed for feed in self._intake.feeds if _is_urgent(feed)]
         if urgent:
             self._pump(now_s, flush=True)
-        if urgent or now_s - self._synced_s >= _SYNC_S:
-            self._sync(now_s)
+        self._sync(now_s, at_once=bool(urgent))
         self._note_gaps()
         if self._recording.anchor_ns is not None:
             self._watch_clock()
@@ -97,21 +101,23 @@ class Engine:
                 _calm(feed)
         return any(more)
 
-    def _sync(self, now_s: float) -> None:
-        """Sync if something was written; a sync that failed is never tried again."""
-        self._synced_s = now_s
-        if self._file.is_synced or not self._is_durable:
-            return
-        try:
-            self._file.sync()
-        except OSError as error:
+    def _sync(self, now_s: float, at_once: bool) -> None:
+        """Ask for a sync if one is due, and take note of the one that is done."""
+        due = at_once or now_s - self._synced_s >= _SYNC_S
+        if due and self._file.size != self._asked_size and self._is_durable:
+            self._synced_s, self._asked_size = now_s, self._file.size
+            self._syncer.request(self._log_time_ns())
+        if self._syncer.error and self._is_durable:
             self._is_durable = False
-            self._find(f"a sync failed, nothing is durable from here on: {error}")
+            self._find(f"a sync failed, nothing is durable from here on: {self._syncer.error}")
             self._journal.event("FAULT", self._findings[-1], self._log_time_ns())
-            return
-        self._last_sync_ns = self._log_time_ns()
-        for feed in self._intake.feeds:
-            feed.ring.words[LAST_SYNC_NS] = self._last_sync_ns
+        self._note_sync(self._syncer.done_mark)
+
+    def _note_sync(self, time_ns: int) -> None:
+        if time_ns > self._last_sync_ns:
+            self._last_sync_ns = time_ns
+            for feed in self._intake.feeds:
+                feed.ring.words[LAST_SYNC_NS] = time_ns
 
     def _note_gaps(self) -> None:
         """Accounts at the start of each run of drops, and the first reason of a channel."""
@@ -175,6 +181,17 @@ class Engine:
                 self._find(f"writing failed and is tried again: {error}")
                 time.sleep(_RETRY_S)
 
+    def _sync_all(self) -> None:
+        """Sync and wait for it."""
+        if not self._is_durable:
+            return
+        try:
+            self._file.sync()
+            self._note_sync(self._log_time_ns())
+        except OSError as error:
+            self._is_durable = False
+            self._find(f"the last sync failed, the file may not survive a loss of power: {error}")
+
     def _drain(self) -> None:
         self._intake.take()
         self._pump(time.monotonic(), flush=True)
@@ -182,17 +199,10 @@ class Engine:
     def _sign(self, ending: str) -> None:
         """The last words of the recorder: accounts and why it ended."""
         self._note_gaps()
-        self._sync(time.monotonic())
         rows = self._accounts()
         if rows:
             self._write_status(rows)
         self._file.add_metadata("seamlog.recording.end", {"ending": ending})
-
-    def _sync_whole(self) -> None:
-        try:
-            self._file.sync_whole()
-        except OSError as error:
-            self._find(f"the last sync failed, the file may not survive a loss of power: {error}")
 
     def _take_name(self) -> None:
         try:

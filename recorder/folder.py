@@ -25,10 +25,8 @@ from typing import Any
 from seamlog.contracts import Pace
 from seamlog.errors import HardwareError
 
-RECORDING_RECORD = "seamlog.recording"
-"""Name of the metadata record that says what was recorded."""
 RESERVED = ("id", "index", "start_ns", "pace", "ring_path", "producer")
-"""Keys of that record which are not the user's."""
+"""Keys of the metadata record `seamlog.recording` which are not the user's."""
 _SETTLED_S = 60.0
 """A folder younger than this may be about to be locked by its owner."""
 

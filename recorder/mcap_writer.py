@@ -13,8 +13,9 @@ from seamlog.channels import CHANNELS
 from seamlog.mcap.records import Buffer
 from seamlog.mcap.writer import FileWriter
 from seamlog.messages import definition
+from seamlog.segments import RECORDING
 
-from .folder import RECORDING_RECORD, RESERVED, Recording
+from .folder import RESERVED, Recording
 
 CHUNK_BYTES = 256 << 10
 """A chunk closes at this size..."""
@@ -29,18 +30,15 @@ class SessionFile:
         self._recording = recording
         self._file = open(descriptor, "wb", buffering=0)  # noqa: SIM115 - open to the end
         self._writer = FileWriter(self._file, f"seamlog {__version__}")
-        self._schemas: dict[str, int] = {}
-        self._synced = 0
         facts = (recording.id, 1, recording.start_ns, recording.pace, folder, recording.pid)
         own = {key: str(value) for key, value in zip(RESERVED, facts, strict=True)}
-        self._writer.add_metadata(RECORDING_RECORD, dict(recording.meta) | own)
+        self._writer.add_metadata(RECORDING, dict(recording.meta) | own)
 
     def add_channel(self, topic: str, channel_id: int, metadata: Mapping[str, str]) -> None:
         """Take in a channel of the table."""
         row = CHANNELS[topic]
-        if row.schema not in self._schemas:
-            self._schemas[row.schema] = self._writer.add_schema(row.schema, definition(row))
-        self._writer.add_channel(topic, self._schemas[row.schema], metadata, "cdr", channel_id)
+        schema = self._writer.schema_id(row.schema, definition(row))
+        self._writer.add_channel(topic, schema, metadata, "cdr", channel_id)
 
     def write_chunk(
         self,
@@ -74,15 +72,14 @@ class SessionFile:
             raise
 
     @property
-    def is_synced(self) -> bool:
-        """True if nothing was written since the last sync."""
-        return self._synced == self._writer.size
+    def size(self) -> int:
+        """Bytes of whole records written so far."""
+        return self._writer.size
 
-    def sync(self) -> None:
-        """Bring what was written to the disk."""
-        size = self._writer.size
-        os.fdatasync(self._file.fileno())
-        self._synced = size
+    @property
+    def descriptor(self) -> int:
+        """Of the open file."""
+        return self._file.fileno()
 
     def free_bytes(self) -> int:
         """Free space of the file system that holds the session."""
@@ -97,8 +94,8 @@ class SessionFile:
             self._cut()
             raise
 
-    def sync_whole(self) -> None:
-        """Bring the finished file to the disk, with its size."""
+    def sync(self) -> None:
+        """Bring all that was written to the disk, now."""
         os.fsync(self._file.fileno())
 
     def take_name(self) -> None:

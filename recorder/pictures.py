@@ -4,7 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from seamlog.messages import encode_image
+from seamlog.mcap.records import Buffer
+from seamlog.messages import CdrWriter
 
 from .ring import MESSAGE, RECORD, RECORD_HEAD_BYTES
 from .varying import RAW_HEAD
@@ -14,8 +15,26 @@ FRAME_ID = "camera"
 JPEG_QUALITY = 90
 
 
+def picture_payload(
+    stamp_ns: int, frame_id: str, image_format: str, data: Buffer
+) -> tuple[bytes, Buffer]:
+    """CDR payload of a sensor_msgs/msg/CompressedImage in two parts, `data` not copied."""
+    body = memoryview(data).cast("B")
+    writer = CdrWriter()
+    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+    writer.put("int32", seconds)
+    writer.put("uint32", nanoseconds)
+    writer.put("string", frame_id)
+    writer.put("string", image_format)
+    writer.put("uint32", len(body))
+    return writer.payload(), body
+
+
 def picture_encoder(channel_id: int) -> Encode:
     """A function from a raw record of the ring to a Message record of channel `channel_id`."""
+    import cv2
+
+    cv2.setNumThreads(1)
     return partial(_encode, channel_id)
 
 
@@ -28,14 +47,14 @@ def _encode(channel_id: int, raw: memoryview) -> bytes:
     done, jpeg = cv2.imencode(".jpg", image, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
     if not done:
         raise ValueError("OpenCV made no JPEG of it")
-    payload = encode_image(stamp_ns, FRAME_ID, "jpeg", jpeg.tobytes())
-    return message_record(channel_id, sequence, log_time_ns, stamp_ns, payload)
+    payload = picture_payload(stamp_ns, FRAME_ID, "jpeg", jpeg.data)
+    return message_record(channel_id, sequence, log_time_ns, stamp_ns, *payload)
 
 
 def message_record(
-    channel_id: int, sequence: int, log_time_ns: int, publish_time_ns: int, payload: bytes
+    channel_id: int, sequence: int, log_time_ns: int, publish_time_ns: int, *payload: Buffer
 ) -> bytes:
-    """A whole MCAP Message record."""
-    length = RECORD.size - RECORD_HEAD_BYTES + len(payload)
+    """A whole MCAP Message record; the payload may come in parts."""
+    length = RECORD.size - RECORD_HEAD_BYTES + sum(len(part) for part in payload)
     head = RECORD.pack(MESSAGE, length, channel_id, sequence, log_time_ns, publish_time_ns)
-    return head + payload
+    return b"".join((head, *payload))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.clock import Clock
+from seamlog.mcap.records import Buffer
 
 from .fixed import log_time_parts
 from .gate import Gate
@@ -24,7 +25,8 @@ from .ring import (
     Ring,
 )
 
-Encode: TypeAlias = Callable[..., bytes]
+Encode: TypeAlias = Callable[..., tuple[bytes, Buffer]]
+"""From stamp and values to a payload in two parts."""
 RAW_HEAD = struct.Struct("<BQIQQIIB")
 """Opcode, length, sequence, log time, stamp, rows, columns, samples per pixel."""
 _STAMPS = 1 << 63
@@ -57,17 +59,17 @@ class VaryingWriter:
         if get_ident() != self._gate.owner:
             return self._gate.refuse_foreign()
         try:
-            payload = self._encode(stamp_ns, *values)
-            head = self._message_head(stamp_ns, len(payload))
+            start, rest = self._encode(stamp_ns, *values)
+            head = self._message_head(stamp_ns, len(start) + len(rest)) + start
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
-        at = self._reserve(len(head) + len(payload))
+        at = self._reserve(len(head) + len(rest))
         if at is None:
             return False
         body = at + len(head)
         self._ring.data[at:body] = head
-        self._ring.data[body : body + len(payload)] = payload
-        return self._publish(at, len(head) + len(payload))
+        self._ring.data[body : body + len(rest)] = rest
+        return self._publish(at, len(head) + len(rest))
 
     def put_frame(self, stamp_ns: int, image: NDArray[Any]) -> bool:
         """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""

@@ -59,6 +59,8 @@ def test_bad_messages_are_refused_and_harm_nothing(path: Path) -> None:
         ("/events", (1, None)),
         ("/events", (1,)),
         ("/seam/points", ([1.0], ["a"])),
+        ("/camera/image", ("camera", "jpeg", "text")),
+        ("/camera/image", ("camera", "jpeg", None)),
         ("/controller/state", ([1.0] * 9,)),
         ("/controller/state", (1.0,)),
         ("/seam/path", (np.zeros(200_000), np.zeros(200_000))),

@@ -135,10 +135,8 @@ def test_varying_ring_loses_nothing_that_it_accepted(steps: list[int]) -> None:
         assert all(m.data == bytes([m.sequence % 256]) * len(m.data) for m in messages)
 
 
-def encode_block(stamp_ns: int, block: bytes) -> bytes:
-    if not isinstance(block, bytes):
-        raise TypeError("a block is bytes")
-    return block
+def encode_block(stamp_ns: int, block: bytes) -> tuple[bytes, memoryview]:
+    return b"", memoryview(block)
 
 
 @settings(max_examples=30, deadline=None)
