@@ -262,6 +262,27 @@ class PictureBlock(Block):
     track: Track | None = None
 
 
+class Frame(Block):
+    """One picture of a camera, at `seconds` of the run's time line."""
+
+    seconds: float
+    media_type: str
+    sha256: str
+    image: bytes = Field(exclude=True, repr=False)
+
+
+class Frames(Block):
+    """Camera pictures of which the one at the cursor's time is shown; all of one size."""
+
+    kind: Literal["frames"] = "frames"
+    id: str
+    title: str
+    domain: str
+    width_px: int
+    height_px: int
+    frames: list[Frame]
+
+
 AnyBlock = Annotated[
     Heading
     | Text
@@ -277,7 +298,8 @@ AnyBlock = Annotated[
     | TimePlot
     | SeamPlot
     | Histogram
-    | PictureBlock,
+    | PictureBlock
+    | Frames,
     Field(discriminator="kind"),
 ]
 

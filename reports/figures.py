@@ -17,6 +17,7 @@ from .ticks import axis_ticks, padded
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66, 14, 12, 44
 _POINTS_PER_CURVE = 1600
+COLOURS = 6
 BAND_REACH = 0.5
 """How far a band may stretch the y axis beyond the values, in spans of the values."""
 _MOST_RUNS = 200
@@ -99,11 +100,11 @@ def draw_plot(plot: Plot) -> Drawing:
     across = _Scale(*_x_range(x), box.left, box.right)
     up = _Scale(*_y_range(plot), box.bottom, box.top)
     shapes: list[Shape] = []
-    for number, series in enumerate(plot.series, 1):
+    for number, series in enumerate(plot.series):
         if series.low is not None and series.high is not None:
             low, high = (np.clip(e.values, up.low, up.high) for e in (series.low, series.high))
             area = _area(x, low, high, across, up)
-            shapes.append(Shape(area, f"band c{number}"))
+            shapes.append(Shape(area, f"band c{number % COLOURS + 1}"))
     for limit in plot.limits:
         y = up.px(limit.value)
         shapes.append(Shape(f"M{box.left} {y:.1f}H{box.right}", "limit", limit.label))
@@ -112,9 +113,9 @@ def draw_plot(plot: Plot) -> Drawing:
         for mark in plot.marks
         if across.low <= mark.x <= across.high
     ]
-    for number, series in enumerate(plot.series, 1):
+    for number, series in enumerate(plot.series):
         curve = _curve(x, series.values.values, across, up, series.step)
-        shapes.append(Shape(curve, f"line c{number}"))
+        shapes.append(Shape(curve, f"line c{number % COLOURS + 1}"))
     return Drawing(
         label=_spoken(plot),
         box=box,

@@ -18,13 +18,13 @@ from pydantic import BaseModel
 
 from seamlog.results import Verdict
 
-from .content import Column, Histogram, Link, PictureBlock, Plot, Section
+from .content import Column, Frame, Histogram, Link, PictureBlock, Plot, Section
 from .encode import encode
 from .figures import draw_histogram, draw_plot
 from .numbers import figure_quantity, format_quantity
 from .verdicts import grouped, limits_text
 
-SCRIPTS = ("decode.js", "theme.js", "plot.js", "cursor.js", "photo.js", "main.js")
+SCRIPTS = ("decode.js", "theme.js", "plot.js", "cursor.js", "photo.js", "frames.js", "main.js")
 """Our own scripts, in the order in which they are put into one function."""
 
 UPLOT = ("uPlot.iife.min.js", "uPlot.min.css", "LICENSE")
@@ -154,5 +154,5 @@ def _drawing(block: Plot | Histogram) -> Any:
     return draw_histogram(block) if isinstance(block, Histogram) else draw_plot(block)
 
 
-def _data_uri(picture: PictureBlock) -> str:
+def _data_uri(picture: PictureBlock | Frame) -> str:
     return f"data:{picture.media_type};base64,{base64.b64encode(picture.image).decode()}"

@@ -15,7 +15,7 @@ from .content import (
     Notice,
     Table,
 )
-from .pictures import picture_block
+from .pictures import frame_blocks, picture_block
 from .plots import AXES, plots_of, split_unit
 from .run import KINDS, Run
 from .verdicts import statement
@@ -122,5 +122,7 @@ def _cell(name: str, value: Any, units: dict[str, str]) -> Figure | None:
 
 
 def pictures(run: Run, part: Part, leave_out: Collection[str] = ()) -> list[AnyBlock]:
-    """All pictures that are not left out."""
-    return [picture_block(run, part, name) for name in part.pictures if name not in leave_out]
+    """All pictures that are not left out; those with a time as one block."""
+    still = [name for name, picture in part.pictures.items() if picture.time_ns is None]
+    shown = [picture_block(run, part, name) for name in still if name not in leave_out]
+    return [*frame_blocks(run, part), *shown]

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from seamlog.results import Part
+from seamlog.results import Part, Picture
 
-from .content import AnyBlock, Column, Notice, PictureBlock, Track
+from .content import AnyBlock, Column, Frame, Frames, Notice, PictureBlock, Track
 from .run import Run, anchor
 
 MEDIA_TYPES = {
@@ -24,9 +24,9 @@ _TOES = ("left_x_px", "left_y_px", "right_x_px", "right_y_px")
 def picture_block(run: Run, part: Part, name: str, track: Track | None = None) -> AnyBlock:
     """A picture of `part`; one in a format that browsers do not share becomes a notice."""
     picture = part.pictures[name]
-    media_type = MEDIA_TYPES.get(Path(picture.file).suffix.lower())
-    if media_type is None:
-        return Notice(text=f"Picture {picture.file}: not shown", reason="Its format is not known.")
+    media_type = _media_type(picture)
+    if not media_type:
+        return _unknown(picture)
     image = run.results.picture(part, name)
     if picture.width_px > _WIDEST_PX or len(image) > _MOST_BYTES:
         image, media_type = _reduced(image, media_type)
@@ -41,6 +41,42 @@ def picture_block(run: Run, part: Part, name: str, track: Track | None = None) -
         image=image,
         track=track,
     )
+
+
+def frame_blocks(run: Run, part: Part) -> list[AnyBlock]:
+    """The pictures of `part` that have a time, as one block that follows the cursor."""
+    timed = {name: p for name, p in part.pictures.items() if p.time_ns is not None}
+    known = {name: p for name, p in timed.items() if _media_type(p)}
+    blocks: list[AnyBlock] = [_unknown(p) for name, p in timed.items() if name not in known]
+    if not known:
+        return blocks
+    frames = [
+        Frame(
+            seconds=run.second(picture.time_ns or 0),
+            media_type=_media_type(picture),
+            sha256=picture.sha256,
+            image=run.results.picture(part, name),
+        )
+        for name, picture in known.items()
+    ]
+    first = next(iter(known.values()))
+    block = Frames(
+        id=anchor("frames", str(run.index), part.stem),
+        title=first.caption or "Camera",
+        domain=run.time_domain,
+        width_px=first.width_px,
+        height_px=first.height_px,
+        frames=sorted(frames, key=lambda frame: frame.seconds),
+    )
+    return [*blocks, block]
+
+
+def _media_type(picture: Picture) -> str:
+    return MEDIA_TYPES.get(Path(picture.file).suffix.lower(), "")
+
+
+def _unknown(picture: Picture) -> Notice:
+    return Notice(text=f"Picture {picture.file}: not shown", reason="Its format is not known.")
 
 
 def toe_track(run: Run, part: Part, table: str = "stations") -> Track | None:

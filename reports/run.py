@@ -63,6 +63,10 @@ class Run:
         seconds: NDArray[np.float64] = ticks / 1e6
         return seconds
 
+    def second(self, time_ns: int) -> float:
+        """One time on the run's time line."""
+        return float(self.seconds(np.array([time_ns], dtype=np.int64))[0])
+
     @property
     def time_domain(self) -> str:
         """Name of the axis that all time plots of this run share."""
@@ -95,7 +99,7 @@ class Run:
         if place.s_mm is not None:
             words.append(f"s = {format_number(place.s_mm, 1)} mm")
         if place.time_ns is not None:
-            seconds = float(self.seconds(np.array([place.time_ns]))[0])
+            seconds = self.second(place.time_ns)
             words.append(f"t = {format_number(seconds, 2)} s")
         domain, x = self.time_domain, seconds
         if place.s_mm is not None and (seconds is None or part.part in _ON_BEAD):

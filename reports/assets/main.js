@@ -56,6 +56,7 @@ async function enliven() {
   for (const block of report.sections.flatMap((section) => section.blocks)) {
     const figure = block.id === undefined ? null : document.getElementById(block.id);
     if (block.kind === "picture" && block.track) bus.photos.push(await makePhoto(figure, block, read, bus));
+    if (block.kind === "frames") bus.photos.push(makeFrames(figure, block));
     if (block.kind !== "time_plot" && block.kind !== "seam_plot") continue;
     const plot = await makePlot(figure, block, read, bus);
     if (plot === null) continue;
@@ -63,7 +64,7 @@ async function enliven() {
     watchKeys(plot, bus);
     figure.classList.add("is-live");
   }
-  const link = bus.links[0], photo = bus.photos[0], plot = bus.plots[0];
+  const link = bus.links[0], photo = bus.photos.find((one) => one.isBead), plot = bus.plots[0];
   if (link) makeSlider(bus, link.source, link.source_x, "Along the seam");
   else if (photo) makeSlider(bus, photo.domain, photo.x, "Along the bead");
   else if (plot) makeSlider(bus, plot.spec.domain, plot.u.data[0], "Place");

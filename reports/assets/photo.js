@@ -39,5 +39,5 @@ async function makePhoto(figure, spec, read, bus) {
     }
     if (best !== null) bus.show(track.domain, x[best]);
   });
-  return { domain: track.domain, x, show };
+  return { domain: track.domain, x, show, isBead: true };
 }

@@ -1,6 +1,6 @@
 /* One live plot in the place of its drawing: every point, thinned only while drawing. */
 
-const PLOT_HEIGHT = 250, STRIP_HEIGHT = 165;
+const PLOT_HEIGHT = 250, STRIP_HEIGHT = 165, COLOURS = 6;
 const FONT = "12px system-ui, sans-serif";
 
 /* A point of a curve with as many decimals as its series allows. */
@@ -28,7 +28,7 @@ function seriesOf(spec, data) {
   const list = [{ label: spec.x_label }];
   const bands = [], places = [];
   spec.series.forEach((series, i) => {
-    const stroke = () => colour(`--c${i + 1}`);
+    const stroke = () => colour(`--c${(i % COLOURS) + 1}`);
     const paths = series.step ? uPlot.paths.stepped({ align: 1 }) : undefined;
     places.push(list.length);
     const points = { show: false };
@@ -37,7 +37,7 @@ function seriesOf(spec, data) {
     if (series.low && series.high) {
       const edge = { stroke: "transparent", width: 0, points, auto: false };
       list.push({ ...edge, label: "high" }, { ...edge, label: "low" });
-      bands.push({ series: [list.length - 2, list.length - 1], fill: () => colour(`--band${i + 1}`) });
+      bands.push({ series: [list.length - 2, list.length - 1], fill: () => colour(`--band${(i % COLOURS) + 1}`) });
     }
   });
   return { list, bands, places };
@@ -146,7 +146,7 @@ async function makePlot(figure, spec, read, bus) {
     },
   }, data, box);
   new ResizeObserver(() => {
-    if (box.clientWidth > 0) plot.u.setSize({ width: box.clientWidth, height });
+    if (box.clientWidth > 0 && box.clientWidth !== plot.u.width) plot.u.setSize({ width: box.clientWidth, height });
   }).observe(box);
   return plot;
 }

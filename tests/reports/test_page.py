@@ -80,6 +80,15 @@ def test_hovering_the_width_moves_time_plots_and_the_photo(
     assert "mm" in page.locator(f"{ERROR} .now").inner_text()
 
 
+def test_the_camera_picture_of_the_moment_is_shown(visitor: Visitor, sample_page: Path) -> None:
+    page = visitor.open(sample_page).page
+    _hover(page, ERROR, 0.5)
+    seconds = _cursor(page, ERROR)
+    assert seconds is not None
+    assert _cursor(page, "#frames-0-tracking") == 30 + (seconds - 30) // 4 * 4
+    assert page.locator("#frames-0-tracking img:visible").count() == 1
+
+
 def test_hovering_the_photo_and_a_time_plot_moves_the_width(
     visitor: Visitor, sample_page: Path, sample: Results
 ) -> None:
