@@ -102,7 +102,7 @@ def _contrast(features: Floats, centres: Floats, half: float) -> Floats:
     apart = (spread_one + spread_two) / 2 + ((one - two) / 2) ** 2
     square = ((inside - outside) ** 2 / (0.5 * (spread + apart) + _FLOOR)).sum(axis=2)
     rougher = inside[..., -1] - np.maximum(one[..., -1], two[..., -1])
-    return _saturate(square, 2.0) * (1 + 0.25 * np.tanh(rougher)).astype(np.float32)
+    return _saturate(square, 2.0) * (1 + 0.25 * np.tanh(np.maximum(rougher, 0))).astype(np.float32)
 
 
 def _states(columns: int, narrowest: float, widest: float) -> tuple[Floats, Floats]:

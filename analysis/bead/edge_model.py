@@ -4,6 +4,7 @@ For each shift of the edge the profile across the toe is projected on a small su
 blurred step, ramps on both sides, a dark line outside); the shift that captures most of it wins.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,10 +13,14 @@ from scipy.special import erf
 
 Floats = NDArray[np.float64]
 
-_BLURS_PX = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+_BLURS_PX = tuple(float(blur) for blur in np.geomspace(0.7, 4.6, 8))
 _MODELS = ("step", "line", "ramps", "ramps and line")
 _SHIFT = 0.125
 _RANGE = 2.5
+_GREY_FLOOR = 0.03
+"""Variance in grey levels that any picture has: rounding to 8 bit."""
+_PRICE = 0.1
+"""How much lower (log) the misfit must be for each step to a richer model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,14 +65,26 @@ def _choose(signal: NDArray[np.float32], near: Floats, side: int) -> tuple[str, 
     """Model and blur with the best balance of misfit and freedom, on some of the rows."""
     every = max(1, len(near) // 150)
     some, there = signal[::every], near[::every]
-    window = 2 * _half_window(max(_BLURS_PX)) + 1
 
-    def misfit(key: tuple[str, float]) -> float:
-        fit = _fit(some, there, side, *key)
-        typical = float(np.median(fit.residual)) / fit.freedom + 1e-6
-        return window * float(np.log(typical)) + (window - fit.freedom) * float(np.log(window)) / 2
+    def misfit(model: str, blur: float) -> float:
+        fit = _fit(some, there, side, model, blur)
+        return float(np.log(np.median(fit.residual) / fit.freedom + _GREY_FLOOR))
 
-    return min(((model, blur) for blur in _BLURS_PX for model in _MODELS), key=misfit)
+    found = []
+    for richness, model in enumerate(_MODELS):
+        logs = [misfit(model, blur) for blur in _BLURS_PX]
+        blur = _lowest(logs)
+        found.append((min(*logs, misfit(model, blur)) + _PRICE * richness, model, blur))
+    _, model, blur = min(found)
+    return model, blur
+
+
+def _lowest(misfits: Sequence[float]) -> float:
+    """Blur at the lowest misfit, by a parabola over the geometric grid."""
+    at = int(np.clip(np.argmin(misfits), 1, len(misfits) - 2))
+    a, b, c = misfits[at - 1 : at + 2]
+    move = float(np.clip(0.5 * (a - c) / max(a - 2 * b + c, 1e-9), -1, 1))
+    return float(_BLURS_PX[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move)
 
 
 def _half_window(blur: float) -> int:

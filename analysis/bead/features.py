@@ -13,6 +13,8 @@ Features = NDArray[np.float32]
 
 _TEXTURE_FLOOR = 1.5
 """Grey levels of detail that count as none: 8-bit rounding and a little camera noise."""
+_SPOT = np.ones((3, 3), np.uint8)
+"""What is textured must be broader than this: a bare edge is no texture."""
 
 
 def texture_energy(lightness: NDArray[np.float32], reach_px: float) -> NDArray[np.float32]:
@@ -50,7 +52,9 @@ def reduced_features(photo: Photo, longest_px: int) -> tuple[Features, float]:
     full = stack_texture(photo.opponent(), reach)
     size = (round(photo.width_px / factor), round(photo.height_px / factor))
     reduced: NDArray[Any] = cv2.resize(full, size, interpolation=cv2.INTER_AREA)
-    return reduced.reshape(size[1], size[0], -1).astype(np.float32), factor
+    features = reduced.reshape(size[1], size[0], -1).astype(np.float32)
+    features[..., -1] = cv2.morphologyEx(features[..., -1], cv2.MORPH_OPEN, _SPOT)
+    return features, factor
 
 
 def robust_scale(features: Features) -> NDArray[np.float32]:
