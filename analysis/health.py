@@ -56,7 +56,10 @@ def health_part(session: "Session") -> tuple[Part, Tables]:
         inputs=[input_of(path) for path in session.paths],
         figures=_figures(info.message_count, info.duration_s, rhythms, accounts),
         findings=[*problems, *findings],
-        details={"end_ns": max((w.end_ns for w in session.welds), default=info.end_ns)},
+        details={
+            "end_ns": max((w.end_ns for w in session.welds), default=info.end_ns),
+            "metadata": dict(session.metadata.get("seamlog.weld", {})),
+        },
     )
     return part, {"channels": _table(rhythms, accounts)}
 
