@@ -55,7 +55,7 @@ class GatedRLS:
         self._impulse = 0.0
         self._memory_s = 0.0
         self._rows = 0
-        self._squares = 0.0
+        self._squares = self._products = self._last_error = 0.0
 
     def update(self, position_m: float, velocity_m_s: float, applied_command: float) -> float:
         """Take one sample and the command that acted over the period before it.
@@ -105,7 +105,10 @@ class GatedRLS:
         self._estimate = (p[0] - move * step[0], p[1] - move * step[1], p[2] - move * step[2])
         self._gain = reduced(self._gain, step, weight, 1.0 / kept)
         if self._rows >= 3:
-            self._squares += error * error * weight * kept / period
+            white = error * math.sqrt(weight * kept / period)
+            self._squares += white * white
+            self._products += white * self._last_error
+            self._last_error = white
         self._rows += 1
 
     def _forgetting(self) -> float:
@@ -121,9 +124,14 @@ class GatedRLS:
         return self._estimate
 
     def variances(self) -> tuple[float, float, float]:
-        """From the gain and the prediction errors so far; NaN before ten usable rows."""
+        """From the gain and the prediction errors so far; NaN before ten usable rows.
+
+        Each gap at rest leaves an error that fades with the filter, so neighbouring prediction
+        errors resemble each other; the variance grows by (1 + rho) / (1 - rho) for that.
+        """
         if self._rows < 10:
             return math.nan, math.nan, math.nan
-        noise = self._squares / (self._rows - 3) * self._period_s
+        alike = min(max(self._products / self._squares, 0.0), 0.99) if self._squares > 0 else 0.0
+        noise = self._squares / (self._rows - 3) * self._period_s * (1.0 + alike) / (1.0 - alike)
         gain = self._gain
         return noise * gain[0], noise * gain[3], noise * gain[5]
