@@ -58,7 +58,10 @@ def health_part(session: "Session") -> tuple[Part, Tables]:
         findings=[*problems, *findings],
         details={
             "end_ns": max((w.end_ns for w in session.welds), default=info.end_ns),
-            "metadata": dict(session.metadata.get("seamlog.weld", {})),
+            "metadata": {
+                **session.metadata.get("seamlog.weld", {}),
+                **session.metadata.get("seamlog.recording", {}),
+            },
         },
     )
     return part, {"channels": _table(rhythms, accounts)}

@@ -8,19 +8,23 @@ from seamlog.reports.run import Run, utc_date
 from seamlog.reports.verdicts import limits_text
 
 _FIELDS = (
-    ("Weld or part", ("part", "weld", "weld_id")),
+    ("Weld or part", ("part", "weld_id")),
     ("Drawing", ("drawing",)),
     ("Welding procedure (WPS)", ("wps",)),
     ("Welding process", ("process",)),
     ("Joint", ("joint",)),
     ("Material", ("material",)),
+    ("Thickness in mm", ("thickness_mm",)),
+    ("Welding position", ("position",)),
+    ("Filler", ("filler",)),
+    ("Shielding gas", ("shielding_gas",)),
     ("Acceptance level (ISO 5817)", ("acceptance_level", "level")),
     ("Camera", ("camera",)),
     ("Calibration", ("calibration",)),
     ("Age of the calibration", ("calibration_age",)),
     ("Lighting", ("lighting", "illuminance")),
 )
-_SIGNATURES = ("Inspector", "Approver")
+_SIGNATURES = ("Operator", "Inspector", "Approver")
 _METHOD = (
     "Method as ISO 17637 (visual testing), acceptance as ISO 5817 where a level is given. ISO 5817 "
     "has no limit for irregular width: widths are judged against the user's own limits."
@@ -49,11 +53,13 @@ def _facts(run: Run) -> list[Fact]:
 
 
 def _stated(run: Run) -> Iterator[tuple[str, str]]:
-    """What the parts' details say about the weld, flat or under `metadata`."""
-    for part in run.parts:
-        for source in (part.details, part.details.get("metadata")):
-            if isinstance(source, dict):
-                yield from _plain(source)
+    """What the parts' details say about the weld, flat or, which counts more, as metadata."""
+    for source in (
+        *(part.details for part in run.parts),
+        *(part.details.get("metadata") for part in run.parts),
+    ):
+        if isinstance(source, dict):
+            yield from _plain(source)
 
 
 def _plain(source: dict[str, Any]) -> Iterator[tuple[str, str]]:
