@@ -98,18 +98,19 @@ class Frames(Sequence[Frame]):
         return np.array([self._stamp(place) for place in self._places], np.int64)
 
     @cached_property
-    def _by_stamp(self) -> NDArray[np.intp]:
-        return np.argsort(self.stamps_ns, kind="stable")
+    def _by_stamp(self) -> tuple[NDArray[np.int64], NDArray[np.intp]]:
+        order = np.argsort(self.stamps_ns, kind="stable")
+        return self.stamps_ns[order], order
 
     def at(self, time_ns: int) -> Frame:
         """The frame whose stamp is nearest to `time_ns`; `FrameMissing` if there is none."""
         if not len(self):
             raise FrameMissing(f"{self.topic} has no frames near {time_ns} ns; the window is empty")
-        stamps = self.stamps_ns[self._by_stamp]
+        stamps, order = self._by_stamp
         after = int(np.searchsorted(stamps, time_ns))
         near = [place for place in (after - 1, after) if 0 <= place < len(stamps)]
         best = min(near, key=lambda place: abs(int(stamps[place]) - time_ns))
-        return self[int(self._by_stamp[best])]
+        return self[int(order[best])]
 
     def _stamp(self, place: _Place) -> int:
         if place.entry.compression == "":

@@ -6,7 +6,7 @@ shape, so their columns are cut out of the whole batch at once; the rest teaches
 """
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -154,31 +154,24 @@ def _number_reader(
         values = rows.column(at, form, count)
         if is_bool:
             values = values != 0
-        return (
-            _objects([row.astype(row.dtype.newbyteorder("=")) for row in values])
-            if (is_sequence)
-            else values
-        )
+        if is_sequence:
+            return _objects(values.astype(values.dtype.newbyteorder("=")))
+        return values
 
     return read
 
 
-def _objects(values: list[Any]) -> NDArray[Any]:
-    array = np.empty(len(values), object)
-    for place, value in enumerate(values):
-        array[place] = value
-    return array
+def _objects(values: Collection[Any]) -> NDArray[Any]:
+    return np.fromiter(values, object, len(values))
 
 
 def _texts(rows: Rows, at: int, size: int) -> NDArray[Any]:
     raw = rows.column(at, "u1", size)
-    array = np.empty(rows.count, object)
     if (raw == raw[0]).all():
-        array[:] = _decoded(bytes(raw[0]))
-        return array
-    for place, row in enumerate(raw):
-        array[place] = _decoded(row.tobytes())
-    return array
+        return np.full(rows.count, _decoded(bytes(raw[0])), object)
+    data = raw.tobytes()
+    parts = [data[start : start + size] for start in range(0, len(data), size)]
+    return _objects([_decoded(part) for part in parts])
 
 
 def _decoded(data: bytes) -> str:

@@ -10,7 +10,7 @@ from seamlog.mcap.attachments import read_attachment
 from seamlog.mcap.chunks import BARE
 from seamlog.mcap.file import McapFile
 from seamlog.mcap.index import walk
-from seamlog.mcap.message_index import read_message_index
+from seamlog.mcap.message_index import index_count
 from seamlog.mcap.records import ChunkEntry
 from seamlog.mcap.writer import FileWriter
 
@@ -25,8 +25,8 @@ def copy_file(file: McapFile, writer: FileWriter, leave_out: Collection[str] = (
     """
     ids = _Ids(file, writer)
     for entry in file.index.chunks:
-        for data in file.iter_chunks([entry]):
-            _copy_chunk(file, entry, data, writer, ids)
+        for chunk in file.iter_chunks([entry]):
+            _copy_chunk(file, entry, chunk.data, writer, ids)
     for row in file.index.attachments:
         if row.name not in leave_out:
             held = read_attachment(file.source, row, file.limits)
@@ -74,10 +74,10 @@ def _counts(file: McapFile, entry: ChunkEntry) -> dict[int, int]:
     behind = range(entry.offset + entry.length, entry.offset + entry.length + entry.index_length)
     counts = {}
     for number, offset in entry.index_offsets.items():
-        rows = read_message_index(file.source, entry, number)
-        if rows is None or offset not in behind:
+        count = index_count(file.source, entry, number)
+        if not count or offset not in behind:
             return {}
-        counts[number] = len(rows)
+        counts[number] = count
     return counts
 
 

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,10 @@ from seamlog.mcap.chunks import read_chunk
 from seamlog.mcap.columns import LOG_TIME, STAMP, ChannelDecoder, Columns, column_forms
 from seamlog.mcap.index import FileIndex, load_index
 from seamlog.mcap.json_columns import json_columns
-from seamlog.mcap.message_index import is_plausible, read_message_index
+from seamlog.mcap.message_index import all_offsets, plausible_places
 from seamlog.mcap.records import ChannelRecord, ChunkEntry, Malformed
 from seamlog.mcap.ros2msg import DefinitionError, Node, parse
-from seamlog.mcap.rows import iter_batches, walk_messages
+from seamlog.mcap.rows import Chunk, iter_batches, walk_messages
 from seamlog.mcap.source import FileSource
 
 _LOG = logging.getLogger("seamlog")
@@ -47,15 +48,24 @@ class McapFile:
     def entries(self, channel_id: int, window: tuple[int, int] = ENDLESS) -> list[ChunkEntry]:
         """Chunks that may hold messages of the channel in the half-open window, in file order."""
         start, end = window
-        return [
-            entry
-            for entry in self.index.chunks
-            if (channel_id in entry.index_offsets or not entry.index_offsets)
-            and entry.end_ns >= start
-            and entry.start_ns < end
-        ]
+        mine = self._by_channel.get(channel_id, self._unindexed)
+        if window == ENDLESS:
+            return list(mine)
+        return [entry for entry in mine if entry.end_ns >= start and entry.start_ns < end]
 
-    def iter_chunks(self, entries: Iterable[ChunkEntry]) -> Iterator[memoryview]:
+    @cached_property
+    def _unindexed(self) -> list[ChunkEntry]:
+        return [entry for entry in self.index.chunks if not entry.index_offsets]
+
+    @cached_property
+    def _by_channel(self) -> dict[int, list[ChunkEntry]]:
+        found: dict[int, list[ChunkEntry]] = {}
+        for entry in self.index.chunks:
+            for channel_id in entry.index_offsets or self.index.channels:
+                found.setdefault(channel_id, []).append(entry)
+        return found
+
+    def iter_chunks(self, entries: Iterable[ChunkEntry]) -> Iterator[Chunk]:
         """Unpacked, proved chunks; a damaged one is left out and noted as a problem."""
         for entry in entries:
             try:
@@ -66,7 +76,7 @@ class McapFile:
                     f"damaged and was left out: {error}"
                 )
                 continue
-            yield chunk
+            yield Chunk(chunk, partial(all_offsets, self.source, entry))
 
     def note(self, problem: str) -> None:
         """Remember a problem, once, and warn."""
@@ -140,13 +150,13 @@ class McapFile:
 
     def message_places(self, entry: ChunkEntry, channel_id: int) -> list[tuple[int, int]]:
         """Log time and offset in the unpacked chunk of each message of the channel."""
-        rows = read_message_index(self.source, entry, channel_id)
-        if rows is not None and is_plausible(self.source, entry, channel_id, rows):
-            return [(time, offset) for time, offset in rows.tolist()]
+        places = plausible_places(self.source, entry, channel_id)
+        if places is not None:
+            return places
         return [
-            (int.from_bytes(chunk[offset + 15 : offset + 23], "little"), offset)
+            (int.from_bytes(chunk.data[offset + 15 : offset + 23], "little"), offset)
             for chunk in self.iter_chunks([entry])
-            for offset in walk_messages(chunk, channel_id)[0].tolist()
+            for offset in walk_messages(chunk.data, channel_id)[0].tolist()
         ]
 
     def log_times_ns(self, channel: ChannelRecord, window: tuple[int, int]) -> NDArray[np.int64]:

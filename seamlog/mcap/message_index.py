@@ -4,7 +4,6 @@ No CRC covers them, so they are good for finding, never for proving.
 """
 
 import struct
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,42 +15,65 @@ from seamlog.mcap.rows import PAYLOAD
 from seamlog.mcap.source import FileSource
 
 _KEY = struct.Struct("<HI")
+_ROW = struct.Struct("<QQ")
 _PLACE = struct.Struct("<BQHIQ")
 
 
-def read_message_index(
-    source: FileSource, entry: ChunkEntry, channel_id: int
-) -> NDArray[Any] | None:
-    """(log time, offset in the unpacked chunk), shape (n, 2), by offset; None if unusable."""
+def read_message_index(source: FileSource, entry: ChunkEntry, channel_id: int) -> memoryview | None:
+    """Rows of uint64 log time and uint64 offset in the unpacked chunk; None if unusable."""
     at = entry.index_offsets.get(channel_id, 0)
-    head = records.RECORD_HEAD.size
-    if not at or at + head + 6 > source.size:
+    start = at + records.RECORD_HEAD.size + _KEY.size
+    if not at or start > source.size:
         return None
     opcode, length = records.RECORD_HEAD.unpack_from(source.data, at)
-    size = length - 6
-    start = at + head + 6
-    if opcode != records.MESSAGE_INDEX or size < 0 or size % 16 or start + size > source.size:
+    number, size = _KEY.unpack_from(source.data, at + records.RECORD_HEAD.size)
+    if (opcode, number, length) != (records.MESSAGE_INDEX, channel_id, size + _KEY.size):
         return None
-    if _KEY.unpack_from(source.data, at + head) != (channel_id, size):
+    if size % _ROW.size or start + size > source.size:
         return None
-    rows = np.frombuffer(source.data, "<u8", size // 8, start).reshape(-1, 2)
-    offsets = rows[:, 1]
-    return rows if (offsets[1:] > offsets[:-1]).all() else rows[np.argsort(offsets)]
+    return source.data[start : start + size]
 
 
-def is_plausible(
-    source: FileSource, entry: ChunkEntry, channel_id: int, rows: NDArray[Any]
-) -> bool:
-    """True if the rows fit the chunk; where it is not compressed, if they fit its messages."""
-    times, offsets = rows[:, 0], rows[:, 1]
+def index_count(source: FileSource, entry: ChunkEntry, channel_id: int) -> int | None:
+    """Messages of the channel in the chunk by its message index; None if unusable."""
+    rows = read_message_index(source, entry, channel_id)
+    return None if rows is None else len(rows) // _ROW.size
+
+
+def all_offsets(source: FileSource, entry: ChunkEntry) -> NDArray[np.int64] | None:
+    """Offsets of all messages in the unpacked chunk, in order; None if an index is unusable."""
+    found = [read_message_index(source, entry, number) for number in entry.index_offsets]
+    if not found or any(rows is None for rows in found):
+        return None
+    offsets = [np.frombuffer(rows, "<u8")[1::2] for rows in found if rows is not None]
+    return np.sort(np.concatenate(offsets)).astype(np.int64)
+
+
+def plausible_places(
+    source: FileSource, entry: ChunkEntry, channel_id: int
+) -> list[tuple[int, int]] | None:
+    """Log time and offset of each message, by offset; None if they do not fit the chunk.
+
+    Where the chunk is not compressed they must fit its messages, too.
+    """
+    rows = read_message_index(source, entry, channel_id)
+    if rows is None:
+        return None
+    places = sorted(_ROW.iter_unpack(rows), key=lambda row: row[1])
     last = entry.uncompressed_size - PAYLOAD
-    if (times < entry.start_ns).any() or (times > entry.end_ns).any() or (offsets > last).any():
-        return False
-    if entry.compression != NONE:
-        return True
+    if any(offset > last or not entry.start_ns <= t <= entry.end_ns for t, offset in places):
+        return None
+    if entry.compression == NONE and not _fits(source, entry, channel_id, places):
+        return None
+    return places
+
+
+def _fits(
+    source: FileSource, entry: ChunkEntry, channel_id: int, places: list[tuple[int, int]]
+) -> bool:
     start = entry.offset + entry.length - entry.compressed_size
-    for time, offset in rows.tolist():
-        opcode, _, channel, _, log_time = _PLACE.unpack_from(source.data, start + offset)
-        if (opcode, channel, log_time) != (records.MESSAGE, channel_id, time):
+    for time, offset in places:
+        opcode, _, number, _, log_time = _PLACE.unpack_from(source.data, start + offset)
+        if (opcode, number, log_time) != (records.MESSAGE, channel_id, time):
             return False
     return True

@@ -3,9 +3,9 @@
 Nothing here trusts a message index: rows come from the chunk itself, which its CRC has proved.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ PAYLOAD = 31
 """Bytes of a Message record in front of its payload."""
 _HEAD = records.RECORD_HEAD
 _JOIN_BYTES = 1 << 20
+Places: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64]]
+"""Offsets and whole lengths of messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,18 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True)
+class Chunk:
+    """An unpacked, proved chunk.
+
+    `message_offsets` gives the offsets of all messages by its message indexes, in order, None if
+    it has none; they are not proved.
+    """
+
+    data: memoryview
+    message_offsets: Callable[[], NDArray[np.int64] | None]
+
+
+@dataclass(frozen=True, slots=True)
 class Batch:
     """Messages of one channel in file order, grouped by length.
 
@@ -60,63 +74,106 @@ class Batch:
     groups: tuple[tuple[Rows, NDArray[np.int64] | None], ...]
 
 
-def iter_batches(chunks: Iterable[memoryview], channel_id: int) -> Iterator[Batch]:
+def iter_batches(chunks: Iterable[Chunk], channel_id: int) -> Iterator[Batch]:
     """Batches of a channel's messages; small chunks are joined before they are looked at."""
     parts: list[memoryview] = []
     size, lead = 0, b""
     for chunk in chunks:
-        if not lead or chunk[: len(lead)] != lead:
-            lead = _lead(chunk)
-        part = chunk[len(lead) :]
-        if size + len(part) > _JOIN_BYTES and parts:
-            yield _batch(_joined(parts), channel_id)
+        if len(chunk.data) > _JOIN_BYTES // 2:
+            if parts:
+                yield _batch(_joined(parts), channel_id, None)
+                parts, size = [], 0
+            yield _batch(chunk.data, channel_id, chunk)
+            continue
+        if not lead or chunk.data[: len(lead)] != lead:
+            lead = bytes(chunk.data[: _lead_size(chunk.data)])
+        parts.append(chunk.data[len(lead) :])
+        size += len(parts[-1])
+        if size > _JOIN_BYTES:
+            yield _batch(_joined(parts), channel_id, None)
             parts, size = [], 0
-        parts.append(part)
-        size += len(part)
     if parts:
-        yield _batch(_joined(parts), channel_id)
+        yield _batch(_joined(parts), channel_id, None)
 
 
 def _joined(parts: list[memoryview]) -> memoryview:
     return parts[0] if len(parts) == 1 else memoryview(b"".join(parts))
 
 
-def _lead(chunk: memoryview) -> bytes:
-    """The schema and channel records in front of the first message."""
+def _lead_size(data: memoryview) -> int:
+    """Bytes of the schema and channel records in front of the first message."""
     at = 0
-    while at + _HEAD.size <= len(chunk):
-        opcode, length = _HEAD.unpack_from(chunk, at)
+    while at + _HEAD.size <= len(data):
+        opcode, length = _HEAD.unpack_from(data, at)
         if opcode == records.MESSAGE:
             break
         at += _HEAD.size + length
-    return bytes(chunk[:at])
+    return min(at, len(data))
 
 
-def _batch(data: memoryview, channel_id: int) -> Batch:
+def _batch(data: memoryview, channel_id: int, chunk: Chunk | None) -> Batch:
     array = np.frombuffer(data, np.uint8)
     rows = _uniform(data, array, channel_id)
     if rows is not None:
         return Batch(rows.count, ((rows, None),))
-    return _grouped(array, *walk_messages(data, channel_id))
+    places = _indexed(array, chunk, channel_id) if chunk else None
+    return _grouped(array, *(places or walk_messages(data, channel_id)))
 
 
 def _uniform(data: memoryview, array: NDArray[np.uint8], channel_id: int) -> Rows | None:
-    """All of `data` as messages of one length and this channel, or None."""
-    if len(data) < PAYLOAD:
+    """All of `data` behind its lead as messages of one length and this channel, or None."""
+    start = _lead_size(data)
+    size = len(data) - start
+    if size < PAYLOAD:
         return None
-    stride = _HEAD.unpack_from(data)[1] + _HEAD.size
-    if stride < PAYLOAD or len(data) % stride:
+    stride = _HEAD.unpack_from(data, start)[1] + _HEAD.size
+    if stride < PAYLOAD or size % stride:
         return None
-    rows = Rows(array, 0, stride, len(data) // stride, stride)
-    same = (
-        (rows.column(0 - PAYLOAD, "u1") == records.MESSAGE).all()
-        and (rows.column(1 - PAYLOAD, "<u8") == stride - _HEAD.size).all()
-        and (rows.column(9 - PAYLOAD, "<u2") == channel_id).all()
-    )
-    return rows if same else None
+    rows = Rows(array, start, stride, size // stride, stride)
+    head = _HEAD.pack(records.MESSAGE, stride - _HEAD.size) + channel_id.to_bytes(2, "little")
+    first, last = int.from_bytes(head[:8], "little"), int.from_bytes(head[3:], "little")
+    same = rows.column(-PAYLOAD, "<u8") == first
+    if not same.all() or not (rows.column(3 - PAYLOAD, "<u8") == last).all():
+        return None
+    return rows
 
 
-def walk_messages(data: memoryview, channel_id: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _indexed(array: NDArray[np.uint8], chunk: Chunk, channel_id: int) -> Places | None:
+    """The channel's messages by the message indexes, if these prove to be all of the chunk.
+
+    They are if each place holds a message that ends where the next begins, and only other
+    records lie in the gaps.
+    """
+    offsets = chunk.message_offsets()
+    if offsets is None or not len(offsets) or offsets[-1] > len(array) - PAYLOAD or offsets[0] < 0:
+        return None
+    heads = np.lib.stride_tricks.sliding_window_view(array, 11)[offsets]
+    row = (len(offsets),)
+    lengths = np.ndarray(row, "<u8", heads, 1, (11,)) + np.uint64(_HEAD.size)
+    is_message = (heads[:, 0] == records.MESSAGE).all() and (lengths >= PAYLOAD).all()
+    if not is_message or (lengths > len(array)).any():
+        return None
+    whole = lengths.astype(np.int64)
+    ends = np.concatenate([[0], offsets + whole])
+    starts = np.concatenate([offsets, [len(array)]])
+    for gap in np.flatnonzero(ends != starts).tolist():
+        if not _is_filler(chunk.data, int(ends[gap]), int(starts[gap])):
+            return None
+    mine = np.ndarray(row, "<u2", heads, 9, (11,)) == channel_id
+    return offsets[mine], whole[mine]
+
+
+def _is_filler(data: memoryview, at: int, end: int) -> bool:
+    """True if whole records that are no messages fill the bytes from `at` to `end`."""
+    while at + _HEAD.size <= end:
+        opcode, length = _HEAD.unpack_from(data, at)
+        if opcode == records.MESSAGE:
+            return False
+        at += _HEAD.size + length
+    return at == end
+
+
+def walk_messages(data: memoryview, channel_id: int) -> Places:
     """Offsets and whole lengths of the channel's messages, record by record."""
     at, end, unpack = 0, len(data), _HEAD.unpack_from
     low, high = channel_id & 0xFF, channel_id >> 8

@@ -170,10 +170,10 @@ def joints_payload(stamp_ns: int, names: list[str], positions: list[float]) -> b
     return writer.payload()
 
 
-def write_foreign(path: Path, options: Mapping[str, Any]) -> Expected:
+def write_foreign(path: Path, options: Mapping[str, Any], count: int = 60) -> Expected:
     """Three interleaved topics as the mcap package writes them."""
-    stamps, sizes = times(60).tolist(), [place % 4 for place in range(60)]
-    encoder = encoder_columns(60)
+    stamps, sizes = times(count).tolist(), [place % 4 for place in range(count)]
+    encoder = encoder_columns(count)
     with path.open("xb") as file:
         writer = Writer(file, **{"chunk_size": 2000, "use_chunking": True, **options})
         writer.start("ros2", "test")
@@ -200,25 +200,31 @@ def write_foreign(path: Path, options: Mapping[str, Any]) -> Expected:
     return {
         "/table/encoder": encoder | {"log_time_ns": encoder["stamp_ns"] + 3},
         "/joints": {
-            "log_time_ns": times(60) + 3,
-            "stamp_ns": times(60),
-            "header.frame_id": ["base"] * 60,
+            "log_time_ns": times(count) + 3,
+            "stamp_ns": times(count),
+            "header.frame_id": ["base"] * count,
             "name": [["a", "bb", "ccc", "x"][:size] for size in sizes],
             "position": [np.full(size, place + 0.5) for place, size in enumerate(sizes)],
             "tips": [
                 [{"x": place + 0.5, "y": 2 * place + 1.0}] * size
                 for place, size in enumerate(sizes)
             ],
-            "base.y": [-1.5] * 60,
-            "ok": [True] * 60,
+            "base.y": [-1.5] * count,
+            "ok": [True] * count,
         },
-        "/status": {"level": range(60), "inner.text": [str(place) for place in range(60)]},
+        "/status": {"level": range(count), "inner.text": [str(place) for place in range(count)]},
     }
 
 
 @scenario
 def foreign(path: Path) -> Expected:
     return write_foreign(path, {})
+
+
+@scenario
+def foreign_large_chunks(path: Path) -> Expected:
+    """Chunks that are read through their message indexes."""
+    return write_foreign(path, {"chunk_size": 600_000}, 3000)
 
 
 @scenario
