@@ -37,9 +37,13 @@ class Strip:
 
 
 def sample_strip(
-    photo: Photo, plane: Plane, line: Centreline, reach: float, step: float, cubic: bool = True
+    photo: Photo, plane: Plane, line: Centreline, reach: float, step: float, blur: float = 1.0
 ) -> Strip:
-    """Sample the photo along `line`, `reach` to both sides, every `step` across."""
+    """Sample the photo along `line`, `reach` to both sides, every `step` across.
+
+    `blur` is the length of a step in photo px: above 1 the photo is blurred so that no detail
+    falls between the samples.
+    """
     count = int(np.ceil(reach / step))
     offsets = np.arange(-count, count + 1) * step
     x, y = _maps(plane, line, offsets)
@@ -47,11 +51,13 @@ def sample_strip(
     left, right = _span(x, photo.width_px)
     top, bottom = _span(y, photo.height_px)
     part = photo.opponent(slice(top, bottom), slice(left, right))
+    if blur > 1.3:
+        part = cv2.GaussianBlur(part, (0, 0), 0.4 * blur).reshape(part.shape)
     sampled = cv2.remap(
         part,
         (x - left).astype(np.float32),
         (y - top).astype(np.float32),
-        cv2.INTER_CUBIC if cubic else cv2.INTER_LINEAR,
+        cv2.INTER_CUBIC,
         borderMode=cv2.BORDER_REPLICATE,
     )
     return Strip(line, sampled.reshape(*x.shape, -1), valid, offsets, step)

@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 STATION_MM = 0.25
 STATION_PX = 2.0
 NARROWEST_PX = 8.0
+_COARSE = 40
 _ALONG_PX = 2.0
 _ALONG_WIDTHS = 0.03
 """Gaussian averaging along the seam: this many px, or this part of the width if that is more."""
@@ -54,18 +55,17 @@ def measure_strip(
     found = _given_path(photo, plane, prior) if prior is not None else _found_path(photo, plane)
     unit = plane.unit_per_px(plane.to_px(found.points))
     _refuse_narrow(photo, 2 * found.half / unit)
-    rows_per_station, row_step = _row_step(plane, unit)
     path, half = found.points, found.half
-    strip, extent = _straighten(photo, plane, path, half, unit, row_step, freedom=0.45)
+    strip, extent = _straighten(photo, plane, path, half, unit, freedom=0.45)
     for freedom in (0.35, 0.25):
         path = _recentred(strip, extent)
-        half = float(np.median(extent.half)) * unit
+        half = float(np.median(extent.half)) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
-        strip, extent = _straighten(photo, plane, path, half, unit, row_step, freedom)
-    toes = _refine(strip, extent, unit)
-    return assemble(
-        photo, plane, strip, toes, rows_per_station, found.evidence, found.rival, start
-    )
+        strip, extent = _straighten(photo, plane, path, half, unit, freedom)
+    rows_per_station, row_step = _row_step(plane, unit)
+    fine = _sampled(photo, plane, path, half, unit, row_step, unit)
+    toes = _refine(fine, _carried(strip, extent, fine), unit)
+    return assemble(photo, plane, fine, toes, rows_per_station, found.evidence, found.rival, start)
 
 
 def _refuse_narrow(photo: Photo, width_px: float) -> None:
@@ -102,7 +102,7 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     reach = min(0.25 * max(photo.width_px, photo.height_px) * unit, 0.5 * length)
     step = max(unit, reach / 80)
     line = fit_centreline(prior, step, 6 * step)
-    strip = sample_strip(photo, plane, line, reach, step, cubic=False)
+    strip = sample_strip(photo, plane, line, reach, step, blur=step / unit)
     features = stack_texture(strip.opponent, 1.5)
     nearness = np.exp(-0.5 * (strip.offsets / (0.4 * reach)) ** 2).astype(np.float32)
     weight = np.append(nearness, nearness[-1:])
@@ -148,21 +148,39 @@ def _recentred(strip: Strip, extent: Extent) -> Points:
 
 
 def _straighten(
+    photo: Photo, plane: Plane, path: Points, half: float, unit: float, freedom: float
+) -> tuple[Strip, Extent]:
+    """The toes in a strip reduced so that half the bead has about `_COARSE` columns."""
+    step = max(unit, half / _COARSE)
+    strip = _sampled(photo, plane, path, half, unit, step, step)
+    features = strip_features(strip.opponent, max(1.5, 0.03 * half / step))
+    middle = strip.column(np.zeros(len(strip.line.s)))
+    rough = Extent(middle - half / step, middle + half / step, np.zeros(len(strip.line.s)))
+    first = find_toes(features, strip.valid, rough, freedom)
+    return strip, find_toes(features, strip.valid, _calmed(first), 0.6 * freedom)
+
+
+def _sampled(
     photo: Photo,
     plane: Plane,
     path: Points,
     half: float,
     unit: float,
-    row_step: float,
-    freedom: float,
-) -> tuple[Strip, Extent]:
-    line = fit_centreline(path, row_step, max(8.0 * half, 16 * unit))
-    strip = sample_strip(photo, plane, line, 2.4 * half + 8 * unit, unit)
-    features = strip_features(strip.opponent, max(1.5, 0.03 * half / unit))
-    middle = strip.column(np.zeros(len(line.s)))
-    rough = Extent(middle - half / unit, middle + half / unit, np.zeros(len(line.s)))
-    first = find_toes(features, strip.valid, rough, freedom)
-    return strip, find_toes(features, strip.valid, _calmed(first), 0.6 * freedom)
+    along: float,
+    across: float,
+) -> Strip:
+    line = fit_centreline(path, along, max(8.0 * half, 16 * unit))
+    return sample_strip(photo, plane, line, 2.4 * half + 8 * across, across, blur=across / unit)
+
+
+def _carried(coarse: Strip, extent: Extent, fine: Strip) -> Extent:
+    """The extent found in one strip as columns and rows of another along the same path."""
+
+    def carried(values: Floats) -> Floats:
+        return np.interp(fine.line.s, coarse.line.s, values)
+
+    left, right = (fine.column(carried(coarse.offset(e))) for e in (extent.left, extent.right))
+    return Extent(left, right, carried(extent.present))
 
 
 def _calmed(extent: Extent) -> Extent:
