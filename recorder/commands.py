@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from seamlog import plugins
+from seamlog.channels import CHANNELS
 from seamlog.command import command, config_options, force_option, group, output_option
 from seamlog.errors import SeamlogError, UsageError
 from seamlog.outcome import Ending, Outcome
@@ -133,7 +134,8 @@ def _text(run: "Run", output: Path) -> str:
 
 
 def _counts(row: "Account") -> str:
-    gap = "-" if row.longest_gap_s is None else f"{row.longest_gap_s:.3f} s"
+    steady = CHANNELS[row.topic].rate_hz is not None
+    gap = f"{row.longest_gap_s:.3f} s" if steady and row.longest_gap_s is not None else "-"
     counts = f"{row.written:>9} {row.dropped:>8} {row.refused:>8}  {gap}"
     return f"{counts}  ({row.reason})" if row.reason else counts
 

@@ -21,7 +21,7 @@ _SYNC_S = 0.25
 _STATUS_S = 1.0
 _CLOCK_STEP_NS = 100_000_000
 _RETRY_S = 0.1
-_LAST_TRIES_S = 5.0
+_LAST_TRIES_S = 2.0
 """How long writing is tried again after the loop has ended."""
 
 
@@ -74,6 +74,7 @@ class Engine:
         except OSError as error:
             where = f"{self._recording.partial} is unfinished; the rest is in {self._folder}"
             self._find(f"the file could not be finished: {error}; {where}")
+        self._file.close()
         return {
             "channels": [account_document(row) for row in self._accounts()],
             "findings": self._findings,

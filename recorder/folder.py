@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from seamlog.contracts import Pace
-from seamlog.errors import HardwareError
+from seamlog.errors import HardwareError, SpaceMissing
 
 RESERVED = ("id", "index", "start_ns", "pace", "ring_path", "producer")
 """Keys of the metadata record `seamlog.recording` which are not the user's."""
@@ -137,6 +137,17 @@ class OutTray:
     def next_path(self, suffix: str) -> Path:
         """Path for what belongs to the next item; hold `lock` until it is placed."""
         return self.folder / f"{self._next:06d}{suffix}"
+
+    def place_data(self, data: bytes) -> str:
+        """Store `data` for the next item and return its file name; hold `lock` until then."""
+        file = self.next_path(".data")
+        try:
+            file.write_bytes(data)
+        except OSError as error:
+            file.unlink(missing_ok=True)
+            size = f"{len(data) / 2**20:.1f} MiB"
+            raise SpaceMissing(f"{file.parent} has no room for {size}: {error}") from error
+        return file.name
 
     def place(self, item: Mapping[str, Any]) -> None:
         """Hand over `item`."""

@@ -91,17 +91,19 @@ class WritingProcess:
         return self._process.poll() is None
 
     def leave(self) -> None:
-        """Close the pipe in a forked child, which has no part in the recording."""
-        with suppress(OSError):
-            os.close(self._pipe)
+        """Close the pipe: in a forked child, which has no part in the recording, or at the end."""
+        pipe, self._pipe = self._pipe, -1
+        if pipe >= 0:
+            os.close(pipe)
 
     def finish(self, progress: Path) -> dict[str, Any] | None:
         """Tell the process to end and wait while it moves; its accounts, None if it was lost.
 
         `progress` is a file whose growth shows that it works.
         """
-        with suppress(BrokenPipeError):
-            os.write(self._pipe, b"C")
+        if self._pipe >= 0:
+            with suppress(BrokenPipeError):
+                os.write(self._pipe, b"C")
         self.leave()
         output = self._wait(progress)
         try:

@@ -118,16 +118,18 @@ class Recorder:
         return channel.put_frame(self.clock.now_ns() if stamp_ns is None else stamp_ns, image)
 
     def attach(self, name: str, data: bytes, media_type: str) -> None:
-        """Put a file into the session, at most `LIMITS.attachment_bytes`."""
+        """Put a file into the session, at most `LIMITS.attachment_bytes`.
+
+        It goes through shared memory: `SpaceMissing` if there is too little.
+        """
         if not name or len(data) > LIMITS.attachment_bytes:
             most = f"{LIMITS.attachment_bytes >> 20} MiB"
             raise UsageError(f"an attachment needs a name and at most {most}: {name!r}")
         with self._tray.lock:
             self._check_open()
-            file = self._tray.next_path(".data")
-            file.write_bytes(data)
+            file = self._tray.place_data(data)
             item = {"kind": "attachment", "name": name, "media_type": media_type}
-            self._tray.place(item | {"data": file.name, "log_time_ns": self.clock.now_ns()})
+            self._tray.place(item | {"data": file, "log_time_ns": self.clock.now_ns()})
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Put a metadata record into the session."""
