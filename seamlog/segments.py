@@ -10,6 +10,8 @@ from seamlog.mcap.file import McapFile
 
 RECORDING = "seamlog.recording"
 """Metadata record of every session file: `id` of the recording, `index` of the file from 1."""
+PROBLEMS = "seamlog.problems"
+"""Metadata record of a copy: what was missing or damaged in the session that was copied."""
 _SEGMENT = re.compile(r"(?P<stem>.+?)(?:\.\d{4,})?\.mcap")
 
 

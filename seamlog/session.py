@@ -22,7 +22,7 @@ from seamlog.limits import LIMITS, Limits
 from seamlog.mcap.attachments import Attachments
 from seamlog.mcap.columns import LOG_TIME, Columns, by_log_time
 from seamlog.mcap.file import ENDLESS, McapFile
-from seamlog.segments import find_segments
+from seamlog.segments import PROBLEMS, find_segments
 from seamlog.session_info import ChannelInfo, SessionInfo, session_info
 from seamlog.welds import Weld, welds_of
 
@@ -81,7 +81,9 @@ class Session:
     @property
     def problems(self) -> list[str]:
         """What is missing or damaged, as far as it is known by now."""
-        return list(dict.fromkeys(text for file in self.files for text in file.problems))
+        found = [text for file in self.files for text in file.problems]
+        copied = self.metadata.get(PROBLEMS, {}).values()
+        return list(dict.fromkeys([*found, *(f"in the session copied here: {t}" for t in copied)]))
 
     @cached_property
     def welds(self) -> list[Weld]:

@@ -108,10 +108,10 @@ def _check(session: "Session", names: list[str], force: bool) -> None:
             f"{session.path} holds {', '.join(taken)} already; rename the file, or --force to "
             "replace it"
         )
-    if session.problems:
+    if problems := session.files[0].problems:
         raise SessionError(
-            f"{session.path} is not whole, and a copy would hide it: {session.problems[0]}; "
-            "attach to a finished session"
+            f"{session.path} is not whole and stays as it is: {problems[0]}; attach to a "
+            "finished session"
         )
 
 
@@ -123,13 +123,13 @@ def rewrite(session: "Session", attachments: list["Attachment"]) -> None:
     from seamlog.mcap.batch import BatchWriter
 
     names = {item.name for item in attachments}
+    mode = session.path.stat().st_mode
     with BatchWriter(session.path, force=True) as writer:
         writer.copy_session(session, leave_out=names, same_recording=True)
-        if session.problems:
-            raise SessionError(
-                f"{session.path} is damaged and stays as it was: {session.problems[0]}"
-            )
+        if problems := session.files[0].problems:
+            raise SessionError(f"{session.path} is damaged and stays as it was: {problems[0]}")
         for item in attachments:
             writer.attach(
                 item.name, item.data, item.media_type, item.log_time_ns, item.create_time_ns
             )
+    session.path.chmod(mode)

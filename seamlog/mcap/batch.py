@@ -19,7 +19,7 @@ from seamlog.mcap.copying import copy_file
 from seamlog.mcap.packing import RecordTemplate, payload_records
 from seamlog.mcap.writer import FileWriter
 from seamlog.messages import definition
-from seamlog.segments import RECORDING
+from seamlog.segments import PROBLEMS, RECORDING
 
 if TYPE_CHECKING:
     from seamlog.session import Session
@@ -163,17 +163,21 @@ class BatchWriter:
     ) -> None:
         """Copy all channels chunk by chunk, each proved by its CRC, and attachments and metadata.
 
-        Nothing is encoded anew. `leave_out` names attachments; the recording's id is copied only
-        if this file takes the place of the copied one (`same_recording`). `UsageError` for a
-        window.
+        Nothing is encoded anew; what is damaged is left out and the copy says so. `leave_out`
+        names attachments; the recording's id is copied only if this file takes the place of the
+        copied one (`same_recording`). `UsageError` for a window.
         """
         if session.is_window:
             raise UsageError("only a whole session can be copied; write the window's columns")
+        lost = list(session.metadata.get(PROBLEMS, {}).values())
         for file in session.files:
             copy_file(file, self._writer, leave_out)
             for name, values in file.metadata():
-                if name != RECORDING or same_recording:
+                if name != PROBLEMS and (name != RECORDING or same_recording):
                     self.add_metadata(name, values)
+            lost += file.problems
+        if lost:
+            self.add_metadata(PROBLEMS, {f"{place:03}": text for place, text in enumerate(lost)})
 
 
 def _log_times(

@@ -21,6 +21,7 @@ from tests.core.scenarios import (
     Expected,
     assert_same,
     encoder_columns,
+    picture,
     times,
     write_live,
     write_numeric,
@@ -162,3 +163,18 @@ def test_a_window_is_no_session_to_copy(tmp_path: Path) -> None:
     ):
         writer.copy_session(session.window(0, 10))
     assert not (tmp_path / "b.mcap").exists()
+
+
+def test_a_copy_of_a_damaged_session_says_so(tmp_path: Path) -> None:
+    write_live(tmp_path / "a.mcap")
+    data = (tmp_path / "a.mcap").read_bytes()
+    place = data.index(picture(1)) + 9
+    (tmp_path / "a.mcap").write_bytes(data[:place] + b"?" + data[place + 1 :])
+    with (
+        seamlog.open_session(tmp_path / "a.mcap") as session,
+        BatchWriter(tmp_path / "b.mcap") as writer,
+    ):
+        writer.copy_session(session)
+    with seamlog.open_session(tmp_path / "b.mcap") as copy:
+        assert len(copy.columns("/camera/image")["stamp_ns"]) == 5
+        assert any("copied" in text and "CRC" in text for text in copy.info.problems)
