@@ -18,7 +18,8 @@ from pydantic import BaseModel
 
 from seamlog.results import Verdict
 
-from .content import Column, Frame, Histogram, Link, PictureBlock, Plot, Section
+from .content import Frame, PictureBlock, Section
+from .curves import Column, Histogram, Link, Plot
 from .encode import encode
 from .figures import draw_histogram, draw_plot
 from .numbers import figure_quantity, format_quantity

@@ -6,15 +6,7 @@ from typing import Any
 
 from seamlog.results import Figure, Part
 
-from .content import (
-    AnyBlock,
-    CriterionTable,
-    FigureTable,
-    Findings,
-    Heading,
-    Notice,
-    Table,
-)
+from .content import AnyBlock, CriterionTable, FigureTable, Findings, Heading, Notice, Table
 from .pictures import frame_blocks, picture_block
 from .plots import AXES, plots_of, split_unit
 from .run import KINDS, Run

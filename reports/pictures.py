@@ -6,7 +6,8 @@ import numpy as np
 
 from seamlog.results import Part, Picture
 
-from .content import AnyBlock, Column, Frame, Frames, Notice, PictureBlock, Track
+from .content import AnyBlock, Frame, Frames, Notice, PictureBlock, Track
+from .curves import Column
 from .run import Run, anchor
 
 MEDIA_TYPES = {

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from seamlog.results import Part
 
-from .content import Column, Limit, Mark, SeamPlot, Series, TimePlot
+from .curves import Column, Limit, Mark, SeamPlot, Series, TimePlot
 from .numbers import COVERAGE, spelled_unit
 from .run import Run, anchor
 

@@ -58,9 +58,11 @@ class Run:
         return self._columns[key]
 
     def seconds(self, stamp_ns: NDArray[Any]) -> NDArray[np.float64]:
-        """Stamps as seconds on the run's time line, to the nearest microsecond."""
-        ticks = (stamp_ns.astype(np.int64) - self.origin_ns + 500) // 1000
-        seconds: NDArray[np.float64] = ticks / 1e6
+        """Stamps as seconds on the run's time line, to the nearest microsecond; NaN stays."""
+        known = np.isfinite(stamp_ns)
+        seconds = np.full(stamp_ns.shape, np.nan)
+        ticks = (stamp_ns[known].astype(np.int64) - self.origin_ns + 500) // 1000
+        seconds[known] = ticks / 1e6
         return seconds
 
     def second(self, time_ns: int) -> float:
@@ -138,11 +140,11 @@ class Run:
     def _origin_ns(self) -> int:
         """First stamp of any table: zero of the time line."""
         firsts = [
-            int(stamps.min())
+            int(np.nanmin(stamps))
             for part in self.parts
             for name, table in part.tables.items()
             if "stamp_ns" in table.columns and part.part != "join"
-            if (stamps := self.columns(part, name)["stamp_ns"]).size
+            if (stamps := self.columns(part, name)["stamp_ns"]).size and np.isfinite(stamps).any()
         ]
         return min(firsts, default=0)
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seamlog.reports.content import AnyBlock, Histogram, Limit, SeamPlot, TimePlot
+from seamlog.reports.content import AnyBlock
+from seamlog.reports.curves import Histogram, Limit, SeamPlot, TimePlot
 from seamlog.reports.numbers import format_quantity
 from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
 from seamlog.reports.pictures import picture_block, toe_track

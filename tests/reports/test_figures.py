@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from seamlog.reports.content import Column, Histogram, Limit, Mark, SeamPlot, Series
+from seamlog.reports.axes import axis_ticks
+from seamlog.reports.curves import Column, Histogram, Limit, Mark, SeamPlot, Series
 from seamlog.reports.figures import Drawing, draw_histogram, draw_plot
-from seamlog.reports.ticks import axis_ticks
 
 Floats = NDArray[np.float64]
 

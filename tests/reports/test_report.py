@@ -9,7 +9,8 @@ import pytest
 
 from seamlog.errors import ResultsError
 from seamlog.reports import page
-from seamlog.reports.content import Banner, Notice, Plot, Text
+from seamlog.reports.content import Banner, Notice, Text
+from seamlog.reports.curves import Plot
 from seamlog.reports.report import Report
 from seamlog.results import Criterion, Figure, Input, Part, Results, Verdict
 from tests.reports.sample_results import write_sample

@@ -1,12 +1,44 @@
-"""Round numbers for the axes of a drawing."""
+"""The axes of a drawing: scales from values to pixels, and ticks at round numbers."""
 
 import math
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import NDArray
 
 from .numbers import decimals_for, format_number
 
 _ROUND = (1.0, 2.0, 2.5, 5.0, 10.0)
 _FINER = 0.65
 """Rather more ticks than wanted than too few."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """A tick at pixel `at` with its text."""
+
+    at: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Values from `low` to `high` on pixels from `start` to `end`."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def px(self, values: NDArray[Any] | float) -> Any:
+        """Pixels of values, of the same shape."""
+        fraction = (values - self.low) / (self.high - self.low)
+        return self.start + fraction * (self.end - self.start)
+
+    def ticks(self, wanted: int) -> list[Tick]:
+        """About `wanted` ticks at round numbers."""
+        found = axis_ticks(self.low, self.high, wanted)
+        return [Tick(round(float(self.px(value)), 1), text) for value, text in found]
 
 
 def axis_ticks(low: float, high: float, wanted: int) -> list[tuple[float, str]]:
