@@ -35,7 +35,7 @@ WELD = {
     "process": "MAG welding, short arc (ISO 4063: 135-D)",
     "material": "S235JR",
     "thickness_mm": "4",
-    "joint": "butt joint, square groove, gap 1 mm",
+    "joint": "butt joint, square groove, gap 0.4 mm",
     "position": "PA (ISO 6947)",
     "filler": "G 42 4 M21 3Si1, 1.0 mm",
     "shielding_gas": "M21 (82 % Ar, 18 % CO2), 12 l/min",

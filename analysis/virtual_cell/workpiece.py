@@ -114,7 +114,7 @@ def _lay_plates(canvas: Shades, seam: TrueSeam, rng: np.random.Generator) -> Non
 
 
 def _cut_seam(plate: Shades, beside_mm: NDArray[np.float64]) -> None:
-    """A gap of 1 mm with ground edges: dark between, bright at the lower edge."""
+    """A gap of 0.4 mm with ground edges: dark between, bright at the lower edge."""
     gap = np.exp(-((beside_mm / 0.62) ** 4))
     ground = np.exp(-0.5 * (beside_mm / 3.2) ** 2)
     lit = np.exp(-0.5 * ((beside_mm - 1.0) / 0.35) ** 2)
