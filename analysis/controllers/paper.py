@@ -122,7 +122,7 @@ class PaperController:
                 f"gain {self._gain:.4g} {axis.unit} is below the static friction {static:.4g} "
                 f"{axis.unit}: reaching the surface is not assured (eq. 5)"
             )
-        least_m_s = smallest_dead_zone_m_s(axis)
+        least_m_s = 0.0 if self._on_reference else smallest_dead_zone_m_s(axis)
         if self._config.dead_zone_m_s < least_m_s:
             found.append(
                 f"dead_zone_m_s {self._config.dead_zone_m_s:.4g} is below {least_m_s:.4g}: the "

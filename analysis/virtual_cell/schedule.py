@@ -4,7 +4,7 @@ The robot runs a straight line at constant speed, with a flying start before the
 speed if one is planted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,6 @@ class Schedule:
 
     y_mm: Floats
     speed_mm_s: Floats
-    identified_s: float
-    returned_s: float
     arc_on_s: float
     arc_off_s: float
     dip_s: tuple[float, float] | None
@@ -57,34 +55,21 @@ def make_schedule(
     seam: TrueSeam, identification_s: float, speed_mm_s: float, dip: SpeedDip | None
 ) -> Schedule:
     """The run of one weld."""
-    returned_s = identification_s + RETURN_S
-    start_s = returned_s + DWELL_S
+    start_s = identification_s + RETURN_S + DWELL_S
     run_in_mm = RUN_IN_S * speed_mm_s
-    dip_middle_s = None
-    if dip is not None:
-        before_mm = run_in_mm + float(seam.y_at(dip.centre_s_mm))
-        lost_s = 0.25 * dip.depth * dip.width_s
-        dip_middle_s = start_s + 0.5 * RAMP_S + before_mm / speed_mm_s + lost_s
     limit_s = start_s + RAMP_S + 3.0 * (WELD_LENGTH_MM + run_in_mm) / speed_mm_s
     time_s: Floats = TICK_S * np.arange(round(limit_s / TICK_S), dtype=np.float64)
     speed: Floats = speed_mm_s * np.clip((time_s - start_s) / RAMP_S, 0.0, 1.0)
-    if dip is not None and dip_middle_s is not None:
-        speed *= _dip(time_s, dip_middle_s, dip)
+    dip_s = None
+    if dip is not None:
+        before_mm = run_in_mm + float(seam.y_at(dip.centre_s_mm))
+        lost_s = 0.25 * dip.depth * dip.width_s
+        middle_s = start_s + 0.5 * RAMP_S + before_mm / speed_mm_s + lost_s
+        dip_s = (middle_s - 0.5 * dip.width_s, middle_s + 0.5 * dip.width_s)
+        speed *= _dip(time_s, middle_s, dip)
     y = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * TICK_S)]) - run_in_mm
     arc_on_s, arc_off_s = np.interp([0.0, WELD_LENGTH_MM], y, time_s)
-    return _ended(
-        Schedule(
-            y,
-            speed,
-            identification_s,
-            returned_s,
-            float(arc_on_s),
-            float(arc_off_s),
-            None
-            if dip is None or dip_middle_s is None
-            else (dip_middle_s - dip.width_s / 2, dip_middle_s + dip.width_s / 2),
-        )
-    )
+    return _ended(Schedule(y, speed, float(arc_on_s), float(arc_off_s), dip_s))
 
 
 def _dip(time_s: Floats, middle_s: float, dip: SpeedDip) -> Floats:
@@ -101,12 +86,4 @@ def _ended(schedule: Schedule) -> Schedule:
     speed[first:] *= np.clip(1.0 - (time_s[first:] - time_s[first]) / RAMP_S, 0.0, 1.0)
     y = schedule.y_mm[:count].copy()
     y[first:] = y[first - 1] + np.cumsum(speed[first:]) * TICK_S
-    return Schedule(
-        y,
-        speed,
-        schedule.identified_s,
-        schedule.returned_s,
-        schedule.arc_on_s,
-        schedule.arc_off_s,
-        schedule.dip_s,
-    )
+    return replace(schedule, y_mm=y, speed_mm_s=speed)

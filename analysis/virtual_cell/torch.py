@@ -9,7 +9,7 @@ from .texture import Picture, Shades, rounded
 TIP_COLUMN, TIP_ROW = 70, 330
 """Where the nozzle's tip is in the sprite."""
 _SHAPE = (352, 140)
-_NOZZLE, _RING, _NECK, _HANDLE = 62.0, 74.0, 205.0, 400.0
+_NOZZLE, _RING, _NECK = 62.0, 74.0, 205.0
 """Ends of the torch's parts, px above the tip."""
 
 

@@ -114,6 +114,11 @@ def test_each_broken_limit_is_named(values: dict[str, float], named: str) -> Non
     assert any(named in warning for warning in warnings)
 
 
+def test_dead_zone_on_the_reference_speed_has_no_limit() -> None:
+    config = PaperConfig(dead_zone_m_s=1e-4, friction_speed="reference")
+    assert PaperController(config, AXIS, PERIOD_S).warnings() == []
+
+
 def test_pd_with_too_much_damping_is_warned_of_and_unstable() -> None:
     wild = PD(PDConfig(kd=40.0), AXIS, PERIOD_S)
     assert "kd" in wild.warnings()[0]
