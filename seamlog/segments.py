@@ -64,7 +64,7 @@ def _of_recording(first: McapFile, others: list[McapFile]) -> list[McapFile]:
 
 
 def _identity(file: McapFile) -> tuple[str | None, int]:
-    for name, values in file.metadata():
+    for name, values in file.metadata:
         if name == RECORDING:
             index = values.get("index", "1")
             return values.get("id"), int(index) if index.isdigit() else 1

@@ -175,7 +175,7 @@ class Session:
     @cached_property
     def metadata(self) -> Mapping[str, dict[str, str]]:
         """Metadata records by name; of two with one name the later one counts."""
-        return {name: values for file in self.files for name, values in file.metadata()}
+        return {name: values for file in self.files for name, values in file.metadata}
 
     def close(self) -> None:
         """Close the files; windows of this session end with it."""

@@ -172,7 +172,7 @@ class BatchWriter:
         lost = list(session.metadata.get(PROBLEMS, {}).values())
         for file in session.files:
             copy_file(file, self._writer, leave_out)
-            for name, values in file.metadata():
+            for name, values in file.metadata:
                 if name != PROBLEMS and (name != RECORDING or same_recording):
                     self.add_metadata(name, values)
             lost += file.problems

@@ -166,8 +166,12 @@ class McapFile:
         times = [t for entry in entries for t, _ in self.message_places(entry, channel.id)]
         return np.array([time for time in times if start <= time < end], np.int64)
 
-    def metadata(self) -> Iterator[tuple[str, dict[str, str]]]:
-        """Metadata records; a damaged one is noted."""
+    @cached_property
+    def metadata(self) -> list[tuple[str, dict[str, str]]]:
+        """Metadata records by name; a damaged one is noted."""
+        return list(self._read_metadata())
+
+    def _read_metadata(self) -> Iterator[tuple[str, dict[str, str]]]:
         for entry in self.index.metadata:
             try:
                 content = self.source.content(entry.offset, entry.length, records.METADATA)

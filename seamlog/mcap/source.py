@@ -1,6 +1,7 @@
 """One MCAP file opened for reading: mapped into memory, so that opening reads nothing."""
 
 import mmap
+from contextlib import suppress
 from pathlib import Path
 
 from seamlog.errors import SessionError
@@ -20,13 +21,20 @@ class FileSource:
                     "fetch it again"
                 )
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        self.data = memoryview(self._map)
+        self._data: memoryview | None = memoryview(self._map)
         if self.data[: len(MAGIC)] != MAGIC:
             self.close()
             raise SessionError(
                 f"{path} is no MCAP file (byte 0 does not begin with its magic); "
                 "'seamlog import' reads other formats"
             )
+
+    @property
+    def data(self) -> memoryview:
+        """All bytes; `SessionError` once the file is closed."""
+        if self._data is None:
+            raise SessionError(f"{self.path} is closed; read it before, inside its with block")
+        return self._data
 
     def content(self, offset: int, length: int, opcode: int) -> memoryview:
         """Content of the record of `length` bytes at `offset`; `Malformed` if it is another."""
@@ -39,8 +47,8 @@ class FileSource:
 
     def close(self) -> None:
         """Unmap the file; views that are still held keep it until they go."""
-        try:
-            self.data.release()
-            self._map.close()
-        except BufferError:
-            pass
+        data, self._data = self._data, None
+        if data is not None:
+            with suppress(BufferError):
+                data.release()
+                self._map.close()

@@ -76,6 +76,18 @@ def test_welds_are_arc_on_to_arc_off(weld: Path) -> None:
             session.weld(3)
 
 
+def test_a_closed_session_says_so(weld: Path) -> None:
+    with seamlog.open_session(weld) as session:
+        kept = session.columns("/table/encoder")
+        frames = session.frames()
+    assert kept["stamp_ns"].tolist() == times(20).tolist()
+    assert session.problems == []
+    for read in (lambda: session.columns("/table/encoder"), lambda: frames[0]):
+        with pytest.raises(SessionError, match="closed"):
+            read()
+    session.close()
+
+
 def test_windows_are_half_open_and_nest(weld: Path) -> None:
     t = times(20).tolist()
     with seamlog.open_session(weld) as session:
