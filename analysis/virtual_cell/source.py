@@ -1,6 +1,6 @@
 """The source `virtual-cell`: one identification run and one weld, faster than real time."""
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -8,7 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from seamlog.clock import SimulatedClock
 from seamlog.contracts import Pace, Sink, SourceResult
 
-from .journal import MovedClock
+if TYPE_CHECKING:
+    from .journal import MovedClock
 
 Fault = Literal["speed_dip", "dropouts", "clock_step", "seam_jump"]
 
@@ -37,7 +38,7 @@ class VirtualCell:
 
     def __init__(self, config: VirtualCellConfig) -> None:
         self.config = config
-        self.clock: MovedClock = SimulatedClock()
+        self.clock: "MovedClock" = SimulatedClock()
 
     def run(self, sink: Sink) -> SourceResult:
         """Weld once; hands over the photo of the bead and its calibration."""
