@@ -38,7 +38,7 @@ class VirtualCell:
 
     def __init__(self, config: VirtualCellConfig) -> None:
         self.config = config
-        self.clock: "MovedClock" = SimulatedClock()
+        self.clock: MovedClock = SimulatedClock()
 
     def run(self, sink: Sink) -> SourceResult:
         """Weld once; hands over the photo of the bead and its calibration."""
