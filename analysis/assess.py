@@ -1,4 +1,4 @@
-"""A whole session to parts of results: health, tracking, identification."""
+"""A whole session to parts of results: health, tracking, identification, bead."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,20 +7,24 @@ from typing import TYPE_CHECKING
 
 from seamlog.config import load_config
 from seamlog.errors import ChannelMissing
-from seamlog.results import Part, Picture, input_of
+from seamlog.results import Columns, Part, Picture, input_of
 
 from .axis_record import COMMAND, ENCODER
 from .health import health_part
 from .identification.assess import identify_or_refuse
 from .identification.part import refused_part
-from .part_tables import Tables
 from .tracking import TrackingLimits, tracking_parts, unknown_tracking
 from .welds import chosen_welds
 
 if TYPE_CHECKING:
     from seamlog.session import Session
 
-Assessed = tuple[Part, Tables, Mapping[str, tuple[bytes, Picture]]]
+Assessed = tuple[
+    Part,
+    Mapping[str, tuple[Columns, Mapping[str, str]]],
+    Mapping[str, tuple[bytes, Picture]],
+]
+"""A part, its tables (columns and their units) and its pictures."""
 
 
 @dataclass(frozen=True)
@@ -46,4 +50,17 @@ def assess_session(session: "Session", options: AnalyzeOptions) -> list[Assessed
         inputs = [input_of(path) for path in session.paths]
         reason = f"no control loop was recorded ({ENCODER}, {COMMAND}): {error}"
         log += [(unknown_tracking(reason, inputs), {}), (refused_part(reason, inputs), {})]
-    return [(part, tables, {}) for part, tables in log]
+    beads = _beads(session, options, welds[0].number if len(welds) == 1 else None)
+    return [*((part, tables, {}) for part, tables in log), *beads]
+
+
+def _beads(session: "Session", options: AnalyzeOptions, weld: int | None) -> list[Assessed]:
+    """Parts of the photos given or attached; a photo that cannot be measured says why."""
+    from .bead.assess import assess_photos
+    from .bead.part import BeadConfig
+    from .bead.sources import attached_photos, photo_files
+
+    config = load_config(BeadConfig, "bead", options.config, options.settings)
+    photos = photo_files(options.photos, None) if options.photos else attached_photos(session)
+    found = assess_photos(photos, options.start, config, weld)
+    return [(photo.part, photo.tables, photo.pictures) for photo in found]

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 class TrackingLimits(BaseModel):
     """What section `limits` of the configuration says about tracking."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     tracking_error_mm: float | None = Field(None, gt=0)
     """Largest magnitude of the tracking error during a weld."""
