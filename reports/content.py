@@ -131,9 +131,14 @@ class Table(Block):
 
 
 class Track(Block):
-    """Where on a picture the places of a domain lie: left and right toe in its pixels."""
+    """Where on a picture the places of a domain lie: left and right toe.
+
+    In pixels of the photo, `width_px` x `height_px`, of which the picture may be a reduced copy.
+    """
 
     domain: str
+    width_px: int
+    height_px: int
     x: Column
     left_x_px: Column
     left_y_px: Column

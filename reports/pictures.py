@@ -80,8 +80,11 @@ def _unknown(picture: Picture) -> Notice:
     return Notice(text=f"Picture {picture.file}: not shown", reason="Its format is not known.")
 
 
-def toe_track(run: Run, part: Part, table: str = "stations") -> Track | None:
-    """Where the stations of a bead lie on its photo, or None if the table does not say."""
+def toe_track(run: Run, part: Part, picture: Picture, table: str = "stations") -> Track | None:
+    """Where the stations of a bead lie on its photo, or None if the table does not say.
+
+    The part's details say how large the photo was; without them the picture is the photo.
+    """
     entry = part.tables.get(table)
     if entry is None or not set(_TOES) <= set(entry.columns):
         return None
@@ -93,7 +96,10 @@ def toe_track(run: Run, part: Part, table: str = "stations") -> Track | None:
     suffix = "" if axis == "s_mm" else "/px"
     toes = {name: Column(values=columns[name][order]) for name in _TOES}
     x = Column(values=columns[axis][order])
-    return Track(domain=run.seam_domain(part) + suffix, x=x, **toes)
+    width_px = part.details.get("photo_width_px", picture.width_px)
+    height_px = part.details.get("photo_height_px", picture.height_px)
+    domain = run.seam_domain(part) + suffix
+    return Track(domain=domain, width_px=width_px, height_px=height_px, x=x, **toes)
 
 
 def _reduced(image: bytes, media_type: str) -> tuple[bytes, str]:

@@ -47,15 +47,24 @@ def limits_text(criterion: Criterion) -> str:
 
 
 def _summary(verdict: Verdict, parts: list[Part]) -> str:
-    criteria = [c for part in parts for c in part.criteria if c.verdict in _ASSESSED]
-    failed = sum(c.verdict is Verdict.FAIL for c in criteria)
-    if verdict is Verdict.FAIL:
-        return f"{failed} of {len(criteria)} limits are not met." if failed else "A part failed."
-    if verdict is Verdict.PASS:
-        return f"All {len(criteria)} limits that were assessed are met."
-    if any(part.criteria for part in parts):
+    criteria = [criterion for part in parts for criterion in part.criteria]
+    if verdict in _ASSESSED:
+        return _counted(verdict, criteria) or f"A part says {verdict.value}."
+    if criteria:
         return "None of the limits could be assessed."
     return "No limits were given, so nothing was judged. The figures below are measured values."
+
+
+def _counted(verdict: Verdict, criteria: Sequence[Criterion]) -> str:
+    """How many of the limits that were assessed are met; '' if there is none to count."""
+    judged = [c.verdict for c in criteria if c.verdict in _ASSESSED]
+    failed = judged.count(Verdict.FAIL)
+    noun = "limit" if len(judged) == 1 else "limits"
+    if verdict is Verdict.FAIL and failed:
+        return f"{failed} of {len(judged)} {noun} not met."
+    if verdict is Verdict.PASS and judged:
+        return "The limit is met." if len(judged) == 1 else f"All {len(judged)} limits are met."
+    return ""
 
 
 def _failures(run: Run, part: Part) -> list[FindingLine]:
@@ -84,11 +93,12 @@ def _statements(runs: Sequence[Run]) -> list[Statement]:
 
 def statement(part: Part, prefix: str = "") -> Statement:
     """A part's verdict and its reason."""
-    reason = part.reason
-    if not reason and part.verdict is Verdict.NOT_ASSESSED and not part.criteria:
-        reason = "No limits were given."
+    unlimited = "" if part.criteria or part.verdict in _ASSESSED else "No limits were given."
     return Statement(
-        subject=prefix + part.title, verdict=part.verdict, reason=reason, section=anchor(part.part)
+        subject=prefix + part.title,
+        verdict=part.verdict,
+        reason=part.reason or _counted(part.verdict, part.criteria) or unlimited,
+        section=anchor(part.part),
     )
 
 

@@ -13,7 +13,7 @@ function wordsAt(bus, at, domain) {
   const told = new Set();
   for (const { spec, u, words: tell, extent } of bus.plots) {
     const x = at.get(spec.domain);
-    if (spec.domain !== domain || x < extent[0] || x > extent[1]) continue;
+    if (spec.domain !== domain || x === undefined || x < extent[0] || x > extent[1]) continue;
     tell(nearest(u.data[0], x)).forEach((text, i) => {
       const { label } = spec.series[i];
       if (told.size < MOST_WORDS && !told.has(label)) { told.add(label); words.push(`${label} ${text}`); }
@@ -64,7 +64,8 @@ async function enliven() {
     watchKeys(plot, bus);
     figure.classList.add("is-live");
   }
-  const link = bus.links[0], photo = bus.photos.find((one) => one.isBead), plot = bus.plots[0];
+  const photo = bus.photos.find((one) => one.isBead), plot = bus.plots[0];
+  const link = photo ? bus.links.find((one) => one.source === photo.domain) : bus.links[0];
   if (link) makeSlider(bus, link.source, link.source_x, "Along the seam");
   else if (photo) makeSlider(bus, photo.domain, photo.x, "Along the bead");
   else if (plot) makeSlider(bus, plot.spec.domain, plot.u.data[0], "Place");

@@ -5,7 +5,7 @@ const FONT = "12px system-ui, sans-serif";
 
 /* A point of a curve with as many decimals as its series allows. */
 function quantityText(value, expanded, series) {
-  if (value === null || value === undefined) return "no value";
+  if (value === null || value === undefined) return "–";
   const shown = (number) => number.toFixed(series.decimals).replace(/^-(?=[0.]*$)/, "");
   const text = series.band_label.startsWith("±") && expanded !== null
     ? `${shown(value)} ± ${shown(expanded)}`

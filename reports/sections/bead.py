@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seamlog.reports.content import AnyBlock
-from seamlog.reports.curves import Histogram, Limit, SeamPlot, TimePlot
+from seamlog.reports.curves import Column, Histogram, Limit, SeamPlot, Series, TimePlot
 from seamlog.reports.numbers import format_quantity
 from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
 from seamlog.reports.pictures import picture_block, toe_track
@@ -42,7 +42,8 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
 def _photo(run: Run, part: Part) -> list[AnyBlock]:
     if _OVERLAY not in part.pictures:
         return []
-    return [picture_block(run, part, _OVERLAY, toe_track(run, part))]
+    track = toe_track(run, part, part.pictures[_OVERLAY])
+    return [picture_block(run, part, _OVERLAY, track)]
 
 
 def _width(run: Run, part: Part) -> list[AnyBlock]:
@@ -54,7 +55,25 @@ def _width(run: Run, part: Part) -> list[AnyBlock]:
     plot = make_plot(
         run, part, _STATIONS, [name], title="Bead width along the weld", limits=_limits(part, name)
     )
+    plot = plot.model_copy(update={"series": _apart(run, part, plot.series[0])})
     return [plot, *_histogram(plot)]
+
+
+def _apart(run: Run, part: Part, width: Series) -> list[Series]:
+    """Stations that the measurement flagged as a series of their own, not to be trusted."""
+    flags = run.columns(part, _STATIONS).get("flagged")
+    if flags is None or flags.dtype != np.bool_ or flags.size != width.values.values.size:
+        return [width]
+    if not flags.any():
+        return [width]
+    trusted = {
+        name: Column(values=np.where(flags, np.nan, column.values))
+        for name in ("values", "low", "high")
+        if (column := getattr(width, name)) is not None
+    }
+    doubtful = Column(values=np.where(flags, width.values.values, np.nan))
+    flagged = Series(label="flagged, not judged", unit=width.unit, values=doubtful)
+    return [width.model_copy(update=trusted), flagged]
 
 
 def _limits(part: Part, name: str) -> list[Limit]:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Locator, Page
 
+from seamlog.reports.report import Report
 from seamlog.results import Results
 from tests.reports.conftest import Visitor
-from tests.reports.sample_results import SLOW_S_MM
+from tests.reports.sample_results import SLOW_S_MM, write_sample
 
 WIDTH = "#plot-0-bead-stations-width_mm"
 ERROR = "#plot-0-tracking-error-error_mm"
@@ -178,3 +179,17 @@ def test_dark_by_the_system_and_by_the_button(visitor: Visitor, sample_page: Pat
 def test_phone_width_does_not_scroll_sideways(visitor: Visitor, sample_page: Path) -> None:
     page = visitor.open(sample_page, viewport={"width": 390, "height": 844}).page
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_without_a_join_the_photo_says_nothing_about_time(visitor: Visitor, tmp_path: Path) -> None:
+    results = write_sample(tmp_path / "results")
+    (tmp_path / "results" / "join.json").unlink()
+    report = Report()
+    report.add_results(results)
+    report.write(tmp_path / "report.html")
+    page = visitor.open(tmp_path / "report.html").page
+    _hover(page, ERROR, 0.5)
+    _hover(page, WIDTH, 0.5)
+    assert _cursor(page, WIDTH) is not None
+    assert _cursor(page, ERROR) is None
+    assert "t =" not in page.locator("#cursor-text").inner_text()
