@@ -2,7 +2,7 @@
 
 import os
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,11 +41,17 @@ class Channel:
     metadata: Mapping[str, str]
     put: Put
     """`put(stamp_ns, *values) -> bool`, values in the table's order."""
-    put_fields: Callable[[int, Mapping[str, Any]], bool]
+    put_named: Put
+    """`put_named(stamp_ns, **fields) -> bool`; `TypeError` for fields that are not the topic's."""
     put_frame: Callable[[int, NDArray[Any]], bool]
     stop: Stop
     """Take nothing more."""
     gate: Gate
+
+    def refuse_names(self, fields: Collection[str]) -> bool:
+        """Refuse a message whose fields are not the topic's."""
+        wanted = ", ".join(CHANNELS[self.topic].field_names)
+        return self.gate.refuse(f"fields are {wanted}; got {', '.join(fields)}")
 
 
 def known_row(topic: str) -> Row:
@@ -73,7 +79,7 @@ def make_channel(
         ring = fixed_ring(path, channel_id, layout(topic))
         gate = gate_to(topic, ring)
         put, stop = fixed_put(ring, gate, layout(topic), clock)
-        channel = Channel(topic, metadata, put, _by_name(put, gate), _no_pictures(gate), stop, gate)
+        channel = Channel(topic, metadata, put, put, _no_pictures(gate), stop, gate)
     else:
         ring = _varying_ring(path, row)
         gate = gate_to(topic, ring)
@@ -96,32 +102,16 @@ def producer_name() -> str:
     return "main" if thread is threading.main_thread() else thread.name
 
 
-def _by_name(put: Put, gate: Gate) -> Callable[[int, Mapping[str, Any]], bool]:
-    """Fields by name for a `put` that takes them as keywords."""
+def _named(put: Put, topic: str) -> Put:
+    """`put` by field names for one that takes values in the table's order."""
+    names = CHANNELS[topic].field_names[1:]
 
-    def put_fields(stamp_ns: int, fields: Mapping[str, Any]) -> bool:
-        try:
-            return put(stamp_ns, **fields)
-        except TypeError:
-            return gate.refuse(f"fields are {_names(gate.topic)}, got {', '.join(fields)}")
-
-    return put_fields
-
-
-def _by_order(put: Put, gate: Gate) -> Callable[[int, Mapping[str, Any]], bool]:
-    """Fields by name for a `put` that takes values in the table's order."""
-    names = CHANNELS[gate.topic].field_names[1:]
-
-    def put_fields(stamp_ns: int, fields: Mapping[str, Any]) -> bool:
+    def put_named(stamp_ns: int, **fields: Any) -> bool:
         if set(fields) != set(names):
-            return gate.refuse(f"fields are {_names(gate.topic)}, got {', '.join(fields)}")
+            raise TypeError(f"{topic} has the fields {names}")
         return put(stamp_ns, *(fields[name] for name in names))
 
-    return put_fields
-
-
-def _names(topic: str) -> str:
-    return ", ".join(CHANNELS[topic].field_names)
+    return put_named
 
 
 def _no_pictures(gate: Gate) -> Callable[[int, NDArray[Any]], bool]:
@@ -143,7 +133,7 @@ def _varying_channel(
     share = _FRAME_SHARE if is_picture else 1.0
     writer = VaryingWriter(ring, gate, channel_id, clock, _encoder(row), share)
     put_frame = writer.put_frame if is_picture else _no_pictures(gate)
-    named = _by_order(writer.put, gate)
+    named = _named(writer.put, row.topic)
     return Channel(row.topic, metadata, writer.put, named, put_frame, writer.stop, gate)
 
 

@@ -3,10 +3,11 @@
 import logging
 import os
 import sys
+import threading
 import time
 import uuid
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
@@ -65,6 +66,7 @@ class Recorder:
             raise
         self._tray = OutTray(folder)
         self._channels: dict[tuple[str, int], Channel] = {}
+        self._mine = threading.local()
         self._strangers: dict[str, str] = {}
         self._final: Status | None = None
         _living.add(self)
@@ -102,10 +104,16 @@ class Recorder:
 
     def log(self, topic: str, stamp_ns: int | None = None, **fields: Any) -> bool:
         """Log one message by field names; False if it was not accepted."""
-        channel = self._channels.get((topic, get_ident())) or self._late_channel(topic)
-        if channel is None:
-            return self._turn_away(topic)
-        return channel.put_fields(self.clock.now_ns() if stamp_ns is None else stamp_ns, fields)
+        try:
+            put = self._mine.puts[topic]
+        except (AttributeError, KeyError):
+            put = self._late_put(topic)
+        if stamp_ns is None:
+            stamp_ns = self.clock.now_ns()
+        try:
+            return bool(put(stamp_ns, **fields))
+        except TypeError:
+            return self._channels[topic, get_ident()].refuse_names(fields)
 
     def log_frame(self, topic: str, image: NDArray[Any], stamp_ns: int | None = None) -> bool:
         """Log a picture, uint8, shape (rows, columns) grey or (rows, columns, 3) BGR.
@@ -186,6 +194,13 @@ class Recorder:
     def _gate(self, topic: str, ring: Ring) -> Gate:
         waits = self._recording.pace == "simulated"
         return Gate(topic, ring, waits, self.strict, self._process.is_alive)
+
+    def _late_put(self, topic: str) -> Callable[..., bool]:
+        channel = self._late_channel(topic)
+        if channel is None:
+            return lambda *_, **__: self._turn_away(topic)
+        self._mine.__dict__.setdefault("puts", {})[topic] = channel.put_named
+        return channel.put_named
 
     def _late_channel(self, topic: str) -> Channel | None:
         try:
