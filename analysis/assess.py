@@ -1,6 +1,6 @@
-"""A whole session to parts of results: health, tracking, identification, bead."""
+"""A whole session to parts of results: health, tracking, identification, bead, join."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from .welds import chosen_welds
 
 if TYPE_CHECKING:
     from seamlog.session import Session
+    from seamlog.welds import Weld
 
 Assessed = tuple[
     Part,
@@ -50,17 +51,14 @@ def assess_session(session: "Session", options: AnalyzeOptions) -> list[Assessed
         inputs = [input_of(path) for path in session.paths]
         reason = f"no control loop was recorded ({ENCODER}, {COMMAND}): {error}"
         log += [(unknown_tracking(reason, inputs), {}), (refused_part(reason, inputs), {})]
-    beads = _beads(session, options, welds[0].number if len(welds) == 1 else None)
-    return [*((part, tables, {}) for part, tables in log), *beads]
+    return [*((part, tables, {}) for part, tables in log), *_beads(session, options, welds)]
 
 
-def _beads(session: "Session", options: AnalyzeOptions, weld: int | None) -> list[Assessed]:
-    """Parts of the photos given or attached; a photo that cannot be measured says why."""
-    from .bead.assess import assess_photos
-    from .bead.part import BeadConfig
-    from .bead.sources import attached_photos, photo_files
+def _beads(session: "Session", options: AnalyzeOptions, welds: "Sequence[Weld]") -> list[Assessed]:
+    """Bead and join of the photos given or attached; what cannot be measured says why."""
+    from .bead_assess import bead_and_join
 
-    config = load_config(BeadConfig, "bead", options.config, options.settings)
-    photos = photo_files(options.photos, None) if options.photos else attached_photos(session)
-    found = assess_photos(photos, options.start, config, weld)
-    return [(photo.part, photo.tables, photo.pictures) for photo in found]
+    found = bead_and_join(
+        session, welds, options.photos, options.start, options.config, options.settings
+    )
+    return [(part, tables, pictures) for part, tables, pictures in found]

@@ -106,9 +106,7 @@ def _basis(at: Floats, shift: float, model: str, blur: float) -> Floats:
     return np.linalg.qr(np.array(parts).T)[0]
 
 
-def _fit(
-    signal: NDArray[np.float32], near: Floats, side: int, model: str, blur: float
-) -> _Fit:
+def _fit(signal: NDArray[np.float32], near: Floats, side: int, model: str, blur: float) -> _Fit:
     half = _half_window(max(_BLURS_PX))
     at = np.arange(-half, half + 1)
     centre = np.clip(np.rint(near).astype(int), half, signal.shape[1] - 1 - half)

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.errors import ImageError, LimitExceeded
+from seamlog.errors import ImageError
 from seamlog.limits import LIMITS, Limits
+from seamlog.pictures import PictureHeader, check_picture
 
-from .image_header import picture_size
-
+_SMALLEST_PX = 16
 OPPONENT = np.array([[0.25, 0.5, 0.25], [0.0, -1.0, 1.0], [-1.0, 0.5, 0.5]], dtype=np.float32)
 """Lightness, red - green and yellow - blue from B, G, R. Linear: a blurred edge stays in place."""
 
@@ -68,14 +68,13 @@ def decode_photo(data: bytes, name: str, limits: Limits = LIMITS) -> Photo:
 
     Alpha is left out; palettes become colours; depths other than 8 and 16 bit are refused.
     """
-    width, height = picture_size(data, name)
-    if width * height > limits.image_pixels:
-        raise LimitExceeded(
-            f"{name} has {width} x {height} px, more than the limit of {limits.image_pixels}; "
-            "crop or reduce it"
-        )
-    if width < 16 or height < 16:
-        raise ImageError(f"{name} has {width} x {height} px: nothing can be measured in it")
+    if not data:
+        raise ImageError(f"{name} is empty; copy the file again")
+    header = check_picture(data, name, limits)
+    if min(header.width_px, header.height_px) < _SMALLEST_PX:
+        size = f"{header.width_px} x {header.height_px} px"
+        raise ImageError(f"{name} has {size}: nothing can be measured in it")
+    _check_whole(data, name, header)
     flags = cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
@@ -86,6 +85,17 @@ def decode_photo(data: bytes, name: str, limits: Limits = LIMITS) -> Photo:
     if pixels.dtype not in (np.uint8, np.uint16):
         raise ImageError(f"{name} holds {pixels.dtype} pixels; save it with 8 or 16 bit")
     return make_photo(pixels, name)
+
+
+def _check_whole(data: bytes, name: str, header: PictureHeader) -> None:
+    """Refuse a JPEG or PNG without its end: decoders fill the missing part with grey."""
+    ends = {"image/jpeg": b"\xff\xd9", "image/png": b"IEND"}
+    end = ends.get(header.media_type)
+    body = data.rfind(b"\xff\xda") if header.media_type == "image/jpeg" else 0
+    if end is not None and data.find(end, max(body, 0)) < 0:
+        raise ImageError(
+            f"{name} ends at byte {len(data)} in the middle of the picture; copy the file again"
+        )
 
 
 def make_photo(pixels: NDArray[Any], name: str) -> Photo:

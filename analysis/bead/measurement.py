@@ -13,6 +13,8 @@ from .plane import Plane, Points
 Floats = NDArray[np.float64]
 
 TOE_DEFINITION = "outer toe: outermost change from the bead's to the plate's appearance"
+END = "end of the bead"
+"""Reason of the stations at a start or stop, where the bead is round and has no width."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,9 +55,9 @@ def _sections(features: Features, vertical: bool) -> Features:
     return np.asarray(smooth.reshape(turned.shape)[_ALONG // 2 :: _ALONG])
 
 
-def _found(features: Features, vertical: bool, weight: NDArray[np.float32] | None = None) -> (
-    Band | None
-):
+def _found(
+    features: Features, vertical: bool, weight: NDArray[np.float32] | None = None
+) -> Band | None:
     sections = _sections(features, vertical)
     widest = 0.6 * sections.shape[1]
     return find_band(sections, 3.0, widest, weight, slope=_ALONG)

@@ -228,9 +228,7 @@ def _projection(
     return (opponent @ direction.astype(np.float32)), distance
 
 
-def _sharpest(
-    signal: NDArray[np.float32], edge: Floats, side: int, reach: float
-) -> Floats:
+def _sharpest(signal: NDArray[np.float32], edge: Floats, side: int, reach: float) -> Floats:
     """Chain of the steepest falls from bead to plate within `reach` columns of `edge`."""
     smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.5)
     fall = -side * np.gradient(smooth, axis=1)

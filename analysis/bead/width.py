@@ -9,7 +9,7 @@ from scipy.ndimage import median_filter
 from seamlog.errors import EvidenceError
 
 from .image import Photo
-from .measurement import BeadMeasurement
+from .measurement import END, BeadMeasurement
 from .plane import Plane, Points
 from .sampling import Strip
 
@@ -18,6 +18,7 @@ Floats = NDArray[np.float64]
 _FAINT = 0.04
 """Noise of a toe, as a part of the width, above which a station is flagged."""
 _REFUSED = 0.08
+_ROUND_END = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +58,19 @@ def assemble(
     width = right.offset - left.offset
     typical = float(np.median(width))
     reasons = _reasons(left, right, width, typical, strip)
+    left_px, right_px, centre_px = _points(plane, strip, left, right)
+    bead = _bead_rows(left.present)
+    ends = _ends(photo, centre_px, bead, typical, strip)
+    reasons[ends & (reasons == "")] = END
     flagged = reasons != ""
-    confidence = _confidence(left, right, flagged, typical, evidence, rival, strip.step)
+    confidence = _confidence(left, right, flagged[bead], typical, evidence, rival, strip.step)
     if confidence < _REFUSED:
         raise EvidenceError(
             f"{photo.name}: a band was found, but its edges cannot be told from the plate "
             f"(confidence {confidence:.2f}); take a sharper photo with even light, from above"
         )
-    pick = slice(rows_per_station // 2, None, rows_per_station)
+    pick = slice(bead.start + rows_per_station // 2, bead.stop, rows_per_station)
     u_noise = np.hypot(left.u_noise, right.u_noise)
-    left_px, right_px, centre_px = _points(plane, strip, left, right)
     backwards, starts_at = _direction(centre_px, start)
     order = slice(None, None, -1) if backwards else slice(None)
     sides = (right_px, left_px) if backwards else (left_px, right_px)
@@ -84,12 +88,36 @@ def assemble(
         reason=tuple(str(reason) for reason in reasons[pick][order]),
         unit_per_px=strip.step,
         confidence=confidence,
-        warnings=_warnings(plane, typical / strip.step, rival, confidence, flagged),
+        warnings=_warnings(plane, typical / strip.step, rival, confidence, flagged[bead]),
         starts_at=starts_at,
         direction_known=start is not None,
-        open_start=_at_frame(photo, centre_px[-1 if backwards else 0], typical / strip.step),
-        open_stop=_at_frame(photo, centre_px[0 if backwards else -1], typical / strip.step),
+        open_start=_at_frame(photo, centre_px[pick][order][0], typical / strip.step),
+        open_stop=_at_frame(photo, centre_px[pick][order][-1], typical / strip.step),
     )
+
+
+def _bead_rows(present: Floats) -> slice:
+    """The stretch with the most evidence of bead against plate; gaps inside it stay."""
+    gathered = np.concatenate([[0.0], np.cumsum(np.clip(present, -1, 1))])
+    gain = gathered - np.minimum.accumulate(gathered)
+    last = int(np.argmax(gain))
+    if gain[last] <= 0:
+        return slice(0, len(present))
+    first = last - int(np.argmin(gathered[last::-1]))
+    return slice(first, last)
+
+
+def _ends(
+    photo: Photo, centre_px: Points, bead: slice, typical: float, strip: Strip
+) -> NDArray[np.bool_]:
+    """Rows within half a width of a start or stop that lies in the photo: the bead is round there."""
+    rows = np.arange(len(centre_px))
+    reach = _ROUND_END * typical / float(strip.line.s[1] - strip.line.s[0])
+    ends = np.zeros(len(rows), dtype=bool)
+    for end in (bead.start, bead.stop - 1):
+        if not _at_frame(photo, centre_px[end], typical / strip.step):
+            ends |= np.abs(rows - end) < reach
+    return ends
 
 
 def _reasons(

@@ -22,10 +22,10 @@ class Look:
 
     def distance(self, features: Features) -> NDArray[np.float32]:
         """Mahalanobis distance squared plus log determinant, per place."""
-        inverse = np.linalg.inv(self.covariance).astype(np.float32)
-        away = features - self.mean.astype(np.float32)
-        square = np.einsum("...i,ij,...j->...", away, inverse, away, optimize=True)
-        return np.asarray(square + np.float32(np.linalg.slogdet(self.covariance)[1]))
+        root = np.linalg.cholesky(np.linalg.inv(self.covariance)).astype(np.float32)
+        away = (features - self.mean.astype(np.float32)) @ root
+        away *= away
+        return np.asarray(away.sum(axis=-1) + np.float32(np.linalg.slogdet(self.covariance)[1]))
 
 
 def look_of(samples: Features) -> Look:
@@ -38,9 +38,7 @@ def look_of(samples: Features) -> Look:
     return Look(samples.mean(axis=0, dtype=np.float64), covariance + np.diag(floors))
 
 
-def zone(
-    columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def zone(columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mask of columns in [start, stop) per row, where the photo has samples."""
     at = np.arange(columns)
     return (at >= start[:, None]) & (at < stop[:, None]) & valid

@@ -1,0 +1,99 @@
+"""Photos to parts of results: measured, or refused with the reason."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from seamlog.errors import EvidenceError, ImageError, SeamlogError
+from seamlog.results import Figure, Part, Verdict
+
+from .measurement import TRUSTED
+from .part import BeadConfig, BeadResult, Pictures, Tables, bead_part, measure_photo
+from .sources import PhotoSource
+
+
+@dataclass(frozen=True, slots=True)
+class AssessedPhoto:
+    """A photo's part with its tables and pictures; `refusal` where it could not be measured."""
+
+    part: Part
+    tables: Tables
+    pictures: Pictures
+    result: BeadResult | None
+    refusal: SeamlogError | None = None
+    name: str = field(default="")
+
+    def summary(self) -> dict[str, Any]:
+        """The figures of one photo, JSON-ready."""
+        if self.result is None:
+            return {
+                "photo": self.name,
+                "verdict": self.part.verdict.value,
+                "refused": str(self.refusal),
+            }
+        return {"photo": self.name, **_summary(self.part, self.result)}
+
+
+def _summary(part: Part, result: BeadResult) -> dict[str, Any]:
+    m, even = result.measurement, result.uniformity
+    return {
+        "verdict": part.verdict.value,
+        "refused": None,
+        "unit": m.unit,
+        f"mean_width_{m.unit}": even.mean if even else None,
+        "u_mean_width": even.u_mean if even else None,
+        "width_std": even.std if even else None,
+        "width_cv": even.cv if even else None,
+        "range": even.width_range if even else None,
+        "peak_to_peak_25mm": even.peak_to_peak_25mm if even else None,
+        "stations": len(m.s),
+        "flagged": int((~m.good).sum()),
+        "confidence": m.confidence,
+        "trusted_from": TRUSTED,
+        "toe_definition": m.toe_definition,
+        "starts_at": m.starts_at,
+        "warnings": list(m.warnings),
+    }
+
+
+def assess_photos(
+    sources: Sequence[PhotoSource],
+    start: str | None = None,
+    config: BeadConfig | None = None,
+    weld: int | None = None,
+) -> list[AssessedPhoto]:
+    """Part `bead` of each photo, indexed in order; a refused photo keeps its place."""
+    return [
+        _assess(source, start, config or BeadConfig(), index, weld)
+        for index, source in enumerate(sources, 1)
+    ]
+
+
+def _assess(
+    source: PhotoSource, start: str | None, config: BeadConfig, index: int, weld: int | None
+) -> AssessedPhoto:
+    name = source.photo.name
+    try:
+        result = measure_photo(source.photo, source.calibration, start, config)
+    except (EvidenceError, ImageError) as error:
+        part = _refused(source, config, index, weld, str(error))
+        return AssessedPhoto(part, {}, {}, None, error, name)
+    part, tables, pictures = bead_part(result, source.inputs, config, index, weld)
+    return AssessedPhoto(part, tables, pictures, result, None, name)
+
+
+def _refused(
+    source: PhotoSource, config: BeadConfig, index: int, weld: int | None, reason: str
+) -> Part:
+    unit = "px" if source.calibration is None else "mm"
+    return Part(
+        part="bead",
+        index=index,
+        title=f"Bead width, {source.photo.name.rsplit('/', 1)[-1]}",
+        weld=weld,
+        inputs=list(source.inputs),
+        configuration=config.model_dump(),
+        verdict=Verdict.NOT_MEASURABLE,
+        reason=reason,
+        figures=[Figure(name=f"width_mean_{unit}", label="Mean width", value=None, reason=reason)],
+    )

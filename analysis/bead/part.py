@@ -1,0 +1,253 @@
+"""The bead as a part of the results: figures, criteria, findings, stations, overlay."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from seamlog.calibration import Calibration
+from seamlog.plugins import load
+from seamlog.results import (
+    Columns,
+    Criterion,
+    Figure,
+    Finding,
+    Input,
+    Part,
+    Picture,
+    Place,
+    Severity,
+    Verdict,
+    worst,
+)
+
+from .image import Photo
+from .measurement import END, BeadDetector, BeadMeasurement
+from .overlay import overlay_webp
+from .plane import plane_of
+from .uniformity import Uniformity, uniformity
+
+Tables = Mapping[str, tuple[Columns, Mapping[str, str]]]
+Pictures = Mapping[str, tuple[bytes, Picture]]
+
+_CONFIDENT = 0.5
+
+
+class BeadConfig(BaseModel):
+    """Section `bead` of the configuration: the detector, and the user's limits if any."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    detector: str = "strip"
+    min_width_mm: float | None = None
+    max_width_mm: float | None = None
+    max_width_cv: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BeadResult:
+    """A measured photo with all that a part of the results needs."""
+
+    photo: Photo
+    measurement: BeadMeasurement
+    uniformity: Uniformity | None
+
+
+def measure_photo(
+    photo: Photo,
+    calibration: Calibration | None = None,
+    start: str | None = None,
+    config: BeadConfig | None = None,
+) -> BeadResult:
+    """Measure the bead in a photo with the configured detector.
+
+    `start` tells at which end of the photo the weld began: left, right, top or bottom. Raises
+    `EvidenceError` (no bead to be told), `ImageError`, `CalibrationError`, `UnknownName`.
+    """
+    config = config or BeadConfig()
+    detector: BeadDetector = load("seamlog.bead_detectors", config.detector)
+    measurement = detector(photo, plane_of(photo, calibration), start=start)
+    return BeadResult(photo, measurement, uniformity(measurement))
+
+
+def bead_part(
+    result: BeadResult,
+    inputs: Sequence[Input] = (),
+    config: BeadConfig | None = None,
+    index: int = 1,
+    weld: int | None = None,
+) -> tuple[Part, Tables, Pictures]:
+    """Part `bead` of one photo, with table `stations` and picture `overlay`."""
+    config = config or BeadConfig()
+    m = result.measurement
+    criteria = _criteria(result, config)
+    part = Part(
+        part="bead",
+        index=index,
+        title=f"Bead width, {result.photo.name.rsplit('/', 1)[-1]}",
+        weld=weld,
+        inputs=list(inputs),
+        configuration=config.model_dump(),
+        verdict=worst([criterion.verdict for criterion in criteria]),
+        reason=_reason(criteria),
+        figures=_figures(result),
+        criteria=criteria,
+        findings=_findings(m, weld),
+        details={
+            "unit": m.unit,
+            "toe_definition": m.toe_definition,
+            "starts_at": m.starts_at,
+            "direction_known": m.direction_known,
+            "open_start": m.open_start,
+            "open_stop": m.open_stop,
+            "photo_width_px": result.photo.width_px,
+            "photo_height_px": result.photo.height_px,
+        },
+    )
+    return part, {"stations": _stations(m)}, {"overlay": _picture(result)}
+
+
+def _stations(m: BeadMeasurement) -> tuple[Columns, Mapping[str, str]]:
+    unit = m.unit
+    columns = {
+        f"s_{unit}": m.s,
+        f"width_{unit}": m.width,
+        f"u_width_{unit}": m.u_width,
+        f"u_noise_{unit}": m.u_noise,
+        "left_x_px": m.left_px[:, 0],
+        "left_y_px": m.left_px[:, 1],
+        "right_x_px": m.right_px[:, 0],
+        "right_y_px": m.right_px[:, 1],
+        "centre_x_px": m.centre_px[:, 0],
+        "centre_y_px": m.centre_px[:, 1],
+        "flagged": m.flagged,
+        "reason": np.array(m.reason, dtype=object),
+    }
+    units = {name: name.rsplit("_", 1)[-1] for name in columns if "_" in name}
+    return columns, units
+
+
+def _picture(result: BeadResult) -> tuple[bytes, Picture]:
+    data, width, height = overlay_webp(result.photo, result.measurement)
+    caption = "Photo with both toes (green; red where flagged) and the centreline; ring: s = 0"
+    picture = Picture(
+        file="overlay.webp", caption=caption, width_px=width, height_px=height, sha256=""
+    )
+    return data, picture
+
+
+def _figures(result: BeadResult) -> list[Figure]:
+    m, even = result.measurement, result.uniformity
+    unit = m.unit
+    why = "" if m.confidence >= _CONFIDENT else f"low confidence ({m.confidence:.2f})"
+    if even is None:
+        reason = "fewer than three stations could be measured"
+        return [Figure(name=f"width_mean_{unit}", label="Mean width", value=None, reason=reason)]
+    span = even.peak_to_peak_25mm
+    no_span = "needs a calibration and 25 mm of bead"
+    return [
+        Figure(name=f"width_mean_{unit}", label="Mean width", value=even.mean, unit=unit, u=even.u_mean,
+               reason=why),
+        Figure(name=f"width_std_{unit}", label="Standard deviation of the width, noise taken out",
+               value=even.std, unit=unit, reason=why),
+        Figure(name="width_cv", label="Coefficient of variation, noise taken out",
+               value=even.cv, unit="1", reason=why),
+        Figure(name=f"width_range_{unit}", label="Range of the width", value=even.width_range,
+               unit=unit, reason=why),
+        Figure(name="peak_to_peak_25mm", label="Largest peak to peak within 25 mm (1 mm means)",
+               value=span, unit=unit if span is not None else "", reason=no_span if span is None
+               else why),
+        Figure(name="stations", label="Stations", value=len(m.s), unit="1"),
+        Figure(name="flagged", label="Flagged stations", value=int((~m.good).sum()), unit="1"),
+        Figure(name="confidence", label="Confidence, 0 to 1", value=m.confidence, unit="1"),
+        Figure(name="toe_definition", label="Toe definition", value=m.toe_definition),
+    ]  # fmt: skip
+
+
+def _criteria(result: BeadResult, config: BeadConfig) -> list[Criterion]:
+    criteria = []
+    if config.min_width_mm is not None or config.max_width_mm is not None:
+        criteria.append(_width_criterion(result, config))
+    if config.max_width_cv is not None:
+        even = result.uniformity
+        value = even.cv if even else None
+        verdict = _judged(result, value is not None and value <= config.max_width_cv)
+        criteria.append(
+            Criterion(
+                name="width_cv", label="Evenness of the width", value=value, unit="1",
+                upper=config.max_width_cv, verdict=verdict,
+                reason="" if verdict in (Verdict.PASS, Verdict.FAIL) else _doubt(result),
+            )
+        )  # fmt: skip
+    return criteria
+
+
+def _width_criterion(result: BeadResult, config: BeadConfig) -> Criterion:
+    """The worst station against the limits; PASS only with value + 2 u inside."""
+    m = result.measurement
+    low = -np.inf if config.min_width_mm is None else config.min_width_mm
+    high = np.inf if config.max_width_mm is None else config.max_width_mm
+    limits = {"lower": config.min_width_mm, "upper": config.max_width_mm, "unit": "mm"}
+    label = "Width at every station"
+    if m.unit != "mm" or result.uniformity is None:
+        reason = "no calibration" if m.unit != "mm" else "no station could be measured"
+        return Criterion(
+            name="width_mm", label=label, value=None, verdict=Verdict.NOT_MEASURABLE,
+            reason=reason, **limits,
+        )  # fmt: skip
+    good = np.flatnonzero(m.good)
+    room = np.minimum(m.width[good] - low, high - m.width[good]) - 2 * m.u_width[good]
+    at = good[int(np.argmin(room))]
+    inside = bool(room.min() >= 0)
+    verdict = _judged(result, inside)
+    return Criterion(
+        name="width_mm", label=label, value=float(m.width[at]), u=float(m.u_width[at]),
+        verdict=verdict, place=Place(s_mm=float(m.s[at])),
+        reason="" if verdict in (Verdict.PASS, Verdict.FAIL) else _doubt(result), **limits,
+    )  # fmt: skip
+
+
+def _judged(result: BeadResult, holds: bool) -> Verdict:
+    if result.uniformity is None or not result.measurement.trusted:
+        return Verdict.NOT_MEASURABLE
+    return Verdict.PASS if holds else Verdict.FAIL
+
+
+def _doubt(result: BeadResult) -> str:
+    return f"confidence {result.measurement.confidence:.2f} is too low to judge"
+
+
+def _reason(criteria: list[Criterion]) -> str:
+    if not criteria:
+        return "no limits for the width were given"
+    return "; ".join(criterion.reason for criterion in criteria if criterion.reason)
+
+
+def _findings(m: BeadMeasurement, weld: int | None) -> list[Finding]:
+    findings = [Finding(severity=Severity.WARNING, message=text) for text in m.warnings]
+    for start, stop, reason in gaps(m):
+        if reason == END:
+            continue
+        length = f"{m.s[stop] - m.s[start]:.1f} {m.unit}"
+        place = Place(s_mm=float(m.s[start]), weld=weld) if m.unit == "mm" else None
+        findings.append(
+            Finding(severity=Severity.WARNING, message=f"gap of {length}: {reason}", place=place)
+        )
+    return findings
+
+
+def gaps(m: BeadMeasurement, shortest: float = 1.0) -> list[tuple[int, int, str]]:
+    """Runs of stations without a width to trust (first, last, reason), longer than `shortest`.
+
+    `shortest` is in mm, or in median widths / 6 without calibration.
+    """
+    least = shortest if m.unit == "mm" else shortest * float(np.nanmedian(m.width)) / 6
+    bad = np.concatenate([[False], ~m.good, [False]])
+    edges = np.flatnonzero(np.diff(bad.astype(np.int8))).reshape(-1, 2)
+    found = []
+    for start, stop in edges:
+        if m.s[stop - 1] - m.s[start] >= least:
+            reasons = [reason for reason in m.reason[start:stop] if reason]
+            found.append((int(start), int(stop - 1), max(set(reasons), key=reasons.count)))
+    return found

@@ -1,0 +1,67 @@
+"""Which photos are measured and with which calibration: files, or what a session has attached."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seamlog.calibration import Calibration, load_calibration, parse_calibration
+from seamlog.errors import InputError
+from seamlog.results import Input, input_of
+
+from .image import Photo, decode_photo, load_photo
+
+if TYPE_CHECKING:
+    from seamlog.session import Session
+
+PHOTO, CALIBRATION = "photo/", "calibration/"
+_SUFFIX = ".calibration.json"
+
+
+@dataclass(frozen=True, slots=True)
+class PhotoSource:
+    """A photo with its calibration (None: pixels) and the files both came from."""
+
+    photo: Photo
+    calibration: Calibration | None
+    inputs: tuple[Input, ...]
+
+
+def photo_files(paths: tuple[Path, ...], calibration: Path | None) -> list[PhotoSource]:
+    """Photos from files; without `calibration` the `<stem>.calibration.json` beside each."""
+    return [_from_file(path, calibration or _beside(path)) for path in paths]
+
+
+def _beside(path: Path) -> Path | None:
+    beside = path.with_name(path.stem + _SUFFIX)
+    return beside if beside.is_file() else None
+
+
+def _from_file(path: Path, calibration: Path | None) -> PhotoSource:
+    photo = load_photo(path)
+    inputs = [input_of(path)]
+    if calibration is None:
+        return PhotoSource(photo, None, tuple(inputs))
+    if not calibration.is_file():
+        raise InputError(f"{calibration}: no such calibration file; check the name")
+    inputs.append(input_of(calibration))
+    return PhotoSource(photo, load_calibration(calibration), tuple(inputs))
+
+
+def attached_photos(session: "Session", calibration: Path | None = None) -> list[PhotoSource]:
+    """Photos attached to a session, each with the attached calibration of its name, if any."""
+    names = [name for name in session.attachments if name.startswith(PHOTO)]
+    return [_from_session(session, name, calibration) for name in names]
+
+
+def _from_session(session: "Session", name: str, calibration: Path | None) -> PhotoSource:
+    where = f"{session.path}: {name}"
+    photo = decode_photo(session.attachments[name].data, where)
+    inputs = [input_of(path) for path in session.paths]
+    if calibration is not None:
+        inputs.append(input_of(calibration))
+        return PhotoSource(photo, load_calibration(calibration), tuple(inputs))
+    attached = CALIBRATION + Path(name).stem + _SUFFIX
+    if attached not in session.attachments:
+        return PhotoSource(photo, None, tuple(inputs))
+    found = parse_calibration(session.attachments[attached].data, f"{session.path}: {attached}")
+    return PhotoSource(photo, found, tuple(inputs))

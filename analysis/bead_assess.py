@@ -1,0 +1,64 @@
+"""Bead and join as parts of a session's results: photos measured, then tied to its welds."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from seamlog.config import load_config
+from seamlog.results import Input, Part, input_of
+
+from .bead.assess import AssessedPhoto, assess_photos
+from .bead.part import BeadConfig, Pictures, Tables
+from .bead.sources import attached_photos, photo_files
+from .join import join_part, no_join
+
+if TYPE_CHECKING:
+    from seamlog.session import Session
+    from seamlog.welds import Weld
+
+
+def bead_and_join(
+    session: "Session",
+    welds: Sequence["Weld"],
+    photos: tuple[Path, ...] = (),
+    start: str | None = None,
+    config: Path | None = None,
+    settings: tuple[str, ...] = (),
+) -> list[tuple[Part, Tables, Pictures]]:
+    """Parts `bead` of each photo and `join` of each weld; none without photos.
+
+    Without `photos` those attached to the session are taken. With as many photos as welds each
+    belongs to the weld of its number; else all of them to the only weld.
+    """
+    settled = load_config(BeadConfig, "bead", config, settings)
+    sources = photo_files(photos, None) if photos else attached_photos(session)
+    if not sources:
+        return []
+    only = welds[0].number if len(welds) == 1 else None
+    assessed = assess_photos(sources, start, settled, only)
+    inputs = [input_of(path) for path in session.paths]
+    parts = [(item.part, item.tables, item.pictures) for item in assessed]
+    if not welds:
+        return [*parts, (no_join("the session has no weld", None, inputs), {}, {})]
+    for index, weld in enumerate(welds):
+        parts.append((*_joined(session, weld, index, len(welds), assessed, settled, inputs), {}))
+    return parts
+
+
+def _joined(
+    session: "Session",
+    weld: "Weld",
+    index: int,
+    count: int,
+    assessed: Sequence[AssessedPhoto],
+    config: BeadConfig,
+    inputs: list[Input],
+) -> tuple[Part, Tables]:
+    if count not in (1, len(assessed)):
+        reason = f"{len(assessed)} photos for {count} welds: say with --weld which one they show"
+        return no_join(reason, weld, inputs), {}
+    chosen = assessed if count == 1 else assessed[index : index + 1]
+    measured = [item.result for item in chosen if item.result is not None]
+    if not measured:
+        return no_join(f"no width was measured: {chosen[0].refusal}", weld, inputs), {}
+    return join_part(session, weld, measured[0].measurement, config, inputs)
