@@ -18,25 +18,27 @@ PartMaker = Callable[[Run, Part], Sequence[AnyBlock]]
 
 
 def each_part(runs: Sequence[Run], kind: str, make: PartMaker) -> list[AnyBlock]:
-    """The blocks of every part of one kind; a run without it gets a notice, never silence."""
+    """The blocks of every part of one kind; a run without it is named, never left out silently."""
     blocks: list[AnyBlock] = []
     for run in runs:
         parts = run.of(kind)
-        if len(runs) > 1:
+        if len(runs) > 1 and parts:
             blocks.append(Heading(text=run.label))
-        if not parts:
-            blocks.append(missing(kind))
         for part in parts:
             if len(parts) > 1:
                 blocks.append(Heading(text=part.title))
             blocks += make(run, part)
+    without = [run.label for run in runs if not run.of(kind)]
+    if without:
+        blocks.append(_missing(kind, without if len(without) < len(runs) else []))
     return blocks
 
 
-def missing(kind: str) -> Notice:
-    """What stands where a part is not in the results."""
+def _missing(kind: str, labels: Sequence[str]) -> Notice:
+    """What stands where a part is not in the results; `labels` name them if others hold it."""
     name = KINDS.get(kind, kind)
-    return Notice(text=f"{name}: not recorded", reason="The results hold no such part.")
+    whose = f" of {', '.join(labels)}" if labels else ""
+    return Notice(text=f"{name}: not recorded", reason=f"The results{whose} hold no such part.")
 
 
 def part_blocks(run: Run, part: Part) -> list[AnyBlock]:

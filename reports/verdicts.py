@@ -80,15 +80,24 @@ def _failures(run: Run, part: Part) -> list[FindingLine]:
 
 
 def _statements(runs: Sequence[Run]) -> list[Statement]:
+    """One statement per part, and per kind of part that some or all runs lack."""
+    several = len(runs) > 1
     found = []
-    for run in runs:
-        prefix = f"{run.label}: " if len(runs) > 1 else ""
-        known = {part.part for part in run.parts}
-        for kind in [*KINDS, *sorted(known - set(KINDS))]:
+    for kind in _kinds(runs):
+        for run in runs:
+            prefix = f"{run.label}: " if several else ""
             found += [statement(part, prefix) for part in run.of(kind)]
-            if kind not in known:
-                found.append(_missing(kind, prefix))
+        without = [run for run in runs if not run.of(kind)]
+        if len(without) == len(runs):
+            found.append(_missing(kind, ""))
+        elif kind in KINDS:
+            found += [_missing(kind, f"{run.label}: ") for run in without]
     return found
+
+
+def _kinds(runs: Sequence[Run]) -> list[str]:
+    known = {part.part for run in runs for part in run.parts}
+    return [*KINDS, *sorted(known - set(KINDS))]
 
 
 def statement(part: Part, prefix: str = "") -> Statement:

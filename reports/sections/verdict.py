@@ -1,6 +1,6 @@
 """First screen: is this weld good, where not, and why."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from seamlog.reports.content import AnyBlock, Findings, KeyFigures
 from seamlog.reports.run import Run
@@ -12,7 +12,9 @@ _KEYS = (
     ("tracking", ("rms_error_mm", "peak_error_mm")),
     ("health", ("dropped",)),
 )
-"""Figures for the first screen, those that are there; a kind with none of them shows its first."""
+"""Figures for the first screen, those that are there."""
+_OTHERWISE = (("identification", ("inertia", "viscous_friction", "coulomb_friction", "offset")),)
+"""Figures for the first screen of results without any of these."""
 _RANKS = {Severity.FAULT: 0, Severity.WARNING: 1, Severity.INFO: 2}
 _MOST_LINES = 6
 
@@ -26,12 +28,17 @@ def section(runs: Sequence[Run]) -> list[AnyBlock]:
 
 
 def _key_figures(run: Run) -> list[Figure]:
-    chosen = []
-    for kind, names in _KEYS:
-        for part in run.of(kind)[:1]:
-            listed = [found for name in names if (found := part.figure(name))]
-            chosen += listed[:3] or part.figures[:2]
-    return chosen
+    return _chosen(run, _KEYS) or _chosen(run, _OTHERWISE)
+
+
+def _chosen(run: Run, keys: Iterable[tuple[str, Sequence[str]]]) -> list[Figure]:
+    return [
+        figure
+        for kind, names in keys
+        for part in run.of(kind)[:1]
+        for name in names
+        if (figure := part.figure(name)) is not None
+    ]
 
 
 def _what_went_wrong(runs: Sequence[Run]) -> list[AnyBlock]:
@@ -43,7 +50,10 @@ def _what_went_wrong(runs: Sequence[Run]) -> list[AnyBlock]:
         for line in run.lines(part, part.findings)
         if kind == "join" or line.severity is not Severity.INFO
     ]
-    worst_first = sorted(lines, key=lambda line: _RANKS[line.severity])[:_MOST_LINES]
-    if not worst_first:
+    worst_first = sorted(lines, key=lambda line: _RANKS[line.severity])
+    if not lines:
         return []
-    return [Findings(caption="What went wrong, where and why", findings=worst_first)]
+    caption = "What went wrong, where and why"
+    if len(lines) > _MOST_LINES:
+        caption += f" (the first {_MOST_LINES} of {len(lines)} findings; all stand below)"
+    return [Findings(caption=caption, findings=worst_first[:_MOST_LINES])]

@@ -122,6 +122,9 @@ def test_two_results_stand_side_by_side(tmp_path: Path, sample: Results) -> None
     assert len(ids) == len(set(ids))
     text = page.render(document)
     assert "second.mcap: Bead" in text
+    bead = next(section for section in document.sections if section.name == "bead")
+    assert isinstance(bead.blocks[-1], Notice)
+    assert bead.blocks[-1].reason == "The results of second.mcap hold no such part."
 
 
 def test_the_json_twin_is_what_the_page_shows(sample: Results, sample_page: Path) -> None:
