@@ -172,7 +172,7 @@ def _means(values: Floats, length: int) -> Floats:
     """Means of stretches of `length` that overlap by half; those with gaps are left out."""
     starts = range(0, len(values) - length + 1, max(1, length // 2))
     means = np.array([values[start : start + length].mean() for start in starts])
-    return means[np.isfinite(means)]
+    return np.asarray(means[np.isfinite(means)])
 
 
 def lagged_correlation(

@@ -142,7 +142,7 @@ def _at(wanted: NDArray[np.int64], stamp_ns: NDArray[np.int64], values: Floats) 
     order = np.argsort(stamp_ns, kind="stable")
     start = stamp_ns[order[0]]
     at, known = (wanted - start).astype(np.float64), (stamp_ns[order] - start).astype(np.float64)
-    return np.interp(at, known, values[order], left=np.nan, right=np.nan)
+    return np.asarray(np.interp(at, known, values[order], left=np.nan, right=np.nan))
 
 
 def join_part(
@@ -173,6 +173,7 @@ def join_part(
         findings=[_finding(columns, weld, band, *item) for item in found],
         details={
             "method": tie.method,
+            "offset_mm": tie.offset_mm,
             "u_s_mm": tie.u_s_mm,
             "start_ns": weld.start_ns,
             "end_ns": weld.end_ns,

@@ -20,7 +20,7 @@ _MOVE_COST = 0.02
 _WIDEN_COST = 0.4
 """A bead keeps its width: what a change by a tenth costs, in sections of full evidence."""
 _BROAD = 0.12
-"""Power of the width that evidence grows with: of two bands as evident the broader explains more."""
+"""Power of the width that evidence grows with: of two bands as evident the broader tells more."""
 _FLOOR = 0.15
 """Variance (of scaled features) that any zone has, however flat it looks."""
 
@@ -108,7 +108,7 @@ def _contrast(features: Floats, centres: Floats, half: float) -> Floats:
 def _states(columns: int, narrowest: float, widest: float) -> tuple[Floats, Floats]:
     count = max(4, int(np.ceil(np.log(widest / narrowest) / np.log(1.13))) + 1)
     halves = np.geomspace(narrowest, widest, count).astype(np.float32) / 2
-    return np.arange(columns + 1, dtype=np.float32), halves
+    return np.arange(columns + 1, dtype=np.float32), np.asarray(halves, dtype=np.float32)
 
 
 def find_band(

@@ -103,15 +103,15 @@ def _basis(at: Floats, shift: float, model: str, blur: float) -> Floats:
     if "line" in model:
         broad = np.hypot(blur, 1.2)
         parts.append(np.exp(-0.5 * ((z + 1.2) / broad) ** 2))
-    return np.linalg.qr(np.array(parts).T)[0]
+    return np.asarray(np.linalg.qr(np.array(parts).T)[0])
 
 
 def _fit(signal: NDArray[np.float32], near: Floats, side: int, model: str, blur: float) -> _Fit:
     half = _half_window(max(_BLURS_PX))
-    at = np.arange(-half, half + 1)
+    at = np.arange(-half, half + 1, dtype=np.float64)
     centre = np.clip(np.rint(near).astype(int), half, signal.shape[1] - 1 - half)
     rows = np.arange(len(near))[:, None]
-    profile = signal[rows, centre[:, None] - side * at].astype(np.float64)
+    profile = signal[rows, centre[:, None] - side * at.astype(int)].astype(np.float64)
     weight = np.exp(-0.5 * (at / (half / 2.0)) ** 2)
     profile = (profile - profile.mean(axis=1, keepdims=True)) * weight
     shifts = np.arange(-_RANGE, _RANGE + 1e-9, _SHIFT)
@@ -131,7 +131,7 @@ def _fit(signal: NDArray[np.float32], near: Floats, side: int, model: str, blur:
 
 
 def _weighted(at: Floats, shift: float, model: str, blur: float, weight: Floats) -> Floats:
-    return np.linalg.qr(_basis(at, shift, model, blur) * weight[:, None])[0]
+    return np.asarray(np.linalg.qr(_basis(at, shift, model, blur) * weight[:, None])[0])
 
 
 def _height(signal: NDArray[np.float32], column: Floats, side: int, blur: float) -> Floats:
@@ -140,7 +140,7 @@ def _height(signal: NDArray[np.float32], column: Floats, side: int, blur: float)
     rows = np.arange(len(column))
     inside = np.clip(np.rint(column - side * reach).astype(int), 0, signal.shape[1] - 1)
     outside = np.clip(np.rint(column + side * reach).astype(int), 0, signal.shape[1] - 1)
-    return (signal[rows, inside] - signal[rows, outside]).astype(np.float64)
+    return np.asarray(signal[rows, inside] - signal[rows, outside], dtype=np.float64)
 
 
 def _smoothed(values: Floats) -> Floats:
@@ -148,4 +148,4 @@ def _smoothed(values: Floats) -> Floats:
     count = min(31, len(values))
     kernel = np.ones(count) / count
     padded = np.pad(values, (count // 2, count - 1 - count // 2), mode="edge")
-    return np.convolve(padded, kernel, mode="valid")
+    return np.asarray(np.convolve(padded, kernel, mode="valid"))

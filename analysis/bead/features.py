@@ -1,4 +1,4 @@
-"""What tells a bead from its plate at each place: lightness, colour, and the energy of fine detail."""
+"""What tells a bead from its plate at each place: lightness, colour, fine detail."""
 
 from typing import Any
 
@@ -28,6 +28,15 @@ def stack_texture(opponent: NDArray[np.float32], reach_px: float) -> Features:
     """Opponent channels with their texture energy as one more channel."""
     texture = texture_energy(np.ascontiguousarray(opponent[..., 0]), reach_px)
     return np.concatenate([opponent, texture[..., None]], axis=2)
+
+
+def smoothed(features: Features, across: float, along: float) -> Features:
+    """Features blurred by Gaussians of `across` columns and `along` rows (0: not at all)."""
+    if across:
+        blurred = cv2.GaussianBlur(features, (0, 0), sigmaX=across, sigmaY=along)
+    else:
+        blurred = cv2.GaussianBlur(features, (1, 0), sigmaX=0.01, sigmaY=along)
+    return np.asarray(blurred, dtype=np.float32).reshape(features.shape)
 
 
 def strip_features(opponent: NDArray[np.float32], reach_px: float) -> Features:
@@ -62,4 +71,4 @@ def robust_scale(features: Features) -> NDArray[np.float32]:
     low, high = np.percentile(features.reshape(-1, features.shape[2]), (16, 84), axis=0)
     floors = np.full(features.shape[2], 3.0)
     floors[0], floors[-1] = 6.0, 0.25
-    return np.maximum((high - low) / 2, floors).astype(np.float32)
+    return np.asarray(np.maximum((high - low) / 2, floors), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Photos: decoded within limits, upright, as linear opponent channels (lightness and two colours)."""
+"""Photos: decoded within limits, upright, as opponent channels: lightness and two colours."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,8 +52,8 @@ class Photo:
     def as_bgr8(self) -> NDArray[np.uint8]:
         """A copy for drawing, uint8 (rows, columns, 3)."""
         pixels = self.pixels if self.pixels.dtype == np.uint8 else (self.pixels >> 8)
-        pixels = pixels.astype(np.uint8)
-        return cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels.copy()
+        whole = cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels
+        return np.array(whole, dtype=np.uint8)
 
 
 def load_photo(path: Path, limits: Limits = LIMITS) -> Photo:

@@ -20,7 +20,8 @@ def overlay(photo: Photo, measurement: BeadMeasurement) -> NDArray[np.uint8]:
     picture = photo.as_bgr8()
     factor = min(1.0, _LONGEST_PX / max(picture.shape[:2]))
     if factor < 1:
-        picture = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        reduced = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+        picture = np.asarray(reduced, dtype=np.uint8)
     thick = max(1, round(max(picture.shape[:2]) / 600))
     _line(picture, measurement.centre_px * factor, _CENTRE, 1)
     good = measurement.good

@@ -147,8 +147,8 @@ def _figures(result: BeadResult) -> list[Figure]:
     span = even.peak_to_peak_25mm
     no_span = "needs a calibration and 25 mm of bead"
     return [
-        Figure(name=f"width_mean_{unit}", label="Mean width", value=even.mean, unit=unit, u=even.u_mean,
-               reason=why),
+        Figure(name=f"width_mean_{unit}", label="Mean width", value=even.mean, unit=unit,
+               u=even.u_mean, reason=why),
         Figure(name=f"width_std_{unit}", label="Standard deviation of the width, noise taken out",
                value=even.std, unit=unit, reason=why),
         Figure(name="width_cv", label="Coefficient of variation, noise taken out",

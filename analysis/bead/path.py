@@ -1,15 +1,14 @@
-"""Where the bead lies: found in the photo by itself, in either main direction, at a coarse scale."""
+"""Where the bead lies: found in the photo itself, in either main direction, coarsely."""
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError
 
 from .band import Band, find_band
-from .features import Features, reduced_features
+from .features import Features, reduced_features, smoothed
 from .image import Photo
 from .plane import Points
 
@@ -51,8 +50,7 @@ def _sections(features: Features, vertical: bool) -> Features:
     """Rows that cross the bead: along it smoothed over, and reduced to every `_ALONG`-th."""
     turned = features if vertical else np.swapaxes(features, 0, 1)
     turned = np.ascontiguousarray(turned)
-    smooth = cv2.GaussianBlur(turned, (1, 0), sigmaX=0.01, sigmaY=2.0)
-    return np.asarray(smooth.reshape(turned.shape)[_ALONG // 2 :: _ALONG])
+    return smoothed(turned, 0, 2.0)[_ALONG // 2 :: _ALONG]
 
 
 def _found(

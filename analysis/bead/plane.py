@@ -37,12 +37,13 @@ class Plane:
 
     def px_from_plane(self) -> NDArray[np.float64]:
         """The inverse homography, shape (3, 3)."""
-        return np.linalg.inv(self.plane_from_px)
+        return np.asarray(np.linalg.inv(self.plane_from_px), dtype=np.float64)
 
     def unit_per_px(self, points_px: Points) -> float:
         """Median length of a pixel at these photo points: the root of its area in the plane."""
-        right = self.to_plane(points_px + (0.5, 0.0)) - self.to_plane(points_px - (0.5, 0.0))
-        down = self.to_plane(points_px + (0.0, 0.5)) - self.to_plane(points_px - (0.0, 0.5))
+        half_x, half_y = np.array([0.5, 0.0]), np.array([0.0, 0.5])
+        right = self.to_plane(points_px + half_x) - self.to_plane(points_px - half_x)
+        down = self.to_plane(points_px + half_y) - self.to_plane(points_px - half_y)
         area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
         return float(np.sqrt(np.median(area)))
 

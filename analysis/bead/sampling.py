@@ -45,7 +45,7 @@ def sample_strip(
     falls between the samples.
     """
     count = int(np.ceil(reach / step))
-    offsets = np.arange(-count, count + 1) * step
+    offsets = np.arange(-count, count + 1, dtype=np.float64) * step
     x, y = _maps(plane, line, offsets)
     valid = (x >= 0) & (x <= photo.width_px - 1) & (y >= 0) & (y <= photo.height_px - 1)
     left, right = _span(x, photo.width_px)
@@ -60,7 +60,8 @@ def sample_strip(
         cv2.INTER_CUBIC,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    return Strip(line, sampled.reshape(*x.shape, -1), valid, offsets, step)
+    opponent = np.asarray(sampled, dtype=np.float32).reshape(*x.shape, -1)
+    return Strip(line, opponent, valid, offsets, step)
 
 
 def _span(values: NDArray[np.float64], size: int) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from .band import find_band
 from .chain import best_chain
 from .curve import arc_length, fit_centreline
 from .edge_model import EdgePlaces, locate_edges
-from .features import Features, stack_texture, strip_features
+from .features import Features, smoothed, stack_texture, strip_features
 from .image import Photo
 from .measurement import BeadMeasurement
 from .path import find_path
@@ -120,8 +120,7 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
 
 
 def _blocks(features: Features) -> Features:
-    smooth = cv2.GaussianBlur(features, (1, 0), sigmaX=0.01, sigmaY=2.0)
-    return np.asarray(smooth.reshape(features.shape)[::2])
+    return smoothed(features, 0, 2.0)[::2]
 
 
 def _inside_photo(photo: Photo, plane: Plane, prior: Points) -> Points:
@@ -204,8 +203,7 @@ def _refine(strip: Strip, extent: Extent, unit: float) -> tuple[Toes, Toes]:
     width_px = 2 * float(np.median(extent.half))
     row_px = float(strip.line.s[1] - strip.line.s[0]) / unit
     along = max(_ALONG_PX, _ALONG_WIDTHS * width_px) / row_px
-    smooth = cv2.GaussianBlur(strip.opponent, (1, 0), sigmaX=0.01, sigmaY=along)
-    smooth = smooth.reshape(strip.opponent.shape)
+    smooth = smoothed(strip.opponent, 0, along)
     sides = []
     for side, edge in ((-1, extent.left), (1, extent.right)):
         signal, distance = _projection(smooth, strip.valid, edge, side, extent)

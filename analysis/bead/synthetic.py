@@ -188,12 +188,12 @@ def render(scene: Scene, seed: int = 0) -> SyntheticBead:
     picture += plate * brushed(rng, picture.shape, scene.texture)
     spatter_discs(rng, picture, scene.spatter, seam.locate, matrix, scene.mm_per_px, left, right)
     picture *= _gradient(scene)
-    picture = cv2.GaussianBlur(picture, (0, 0), scene.blur_px) if scene.blur_px else picture
-    picture = picture + scene.noise * rng.standard_normal(picture.shape)
+    blurred = cv2.GaussianBlur(picture, (0, 0), scene.blur_px) if scene.blur_px else picture
+    picture = blurred + scene.noise * rng.standard_normal(picture.shape)
     calibration = PlaneCalibration(
         image_width_px=scene.width_px,
         image_height_px=scene.height_px,
-        plane_mm_from_px=tuple(tuple(float(v) for v in row) for row in matrix),  # type: ignore[arg-type]
+        plane_mm_from_px=tuple(tuple(float(v) for v in row) for row in matrix),
         residual_mm=0.0,
         scale_relative_u=0.0,
         source="rendered",

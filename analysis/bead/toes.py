@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +9,7 @@ from seamlog.errors import EvidenceError
 
 from .band import edge_evidence
 from .chain import best_chain
-from .features import Features, robust_scale
+from .features import Features, robust_scale, smoothed
 from .zones import Look, bead_likeness, look_of, zone
 
 Floats = NDArray[np.float64]
@@ -48,7 +47,7 @@ def find_toes(
     features: Features, valid: NDArray[np.bool_], rough: Extent, freedom: float
 ) -> Extent:
     """Toes near a rough extent: within `freedom` (fraction of the half width) of it."""
-    smooth = cv2.GaussianBlur(features, (0, 0), sigmaX=0.8, sigmaY=2.0).reshape(features.shape)
+    smooth = smoothed(features, 0.8, 2.0)
     columns = features.shape[1]
     half = float(np.median(rough.half))
     edges = _edges(smooth)
@@ -113,7 +112,7 @@ def _edges(features: Features) -> NDArray[np.float32]:
     """Edge evidence at columns: the mean of the two column edges around each."""
     scaled = (features / robust_scale(features)).astype(np.float32)
     at_edges = np.maximum(edge_evidence(scaled, 2), edge_evidence(scaled, 5))
-    return 0.5 * (at_edges[:, :-1] + at_edges[:, 1:])
+    return np.asarray(0.5 * (at_edges[:, :-1] + at_edges[:, 1:]), dtype=np.float32)
 
 
 def _toe(

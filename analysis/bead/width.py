@@ -110,7 +110,7 @@ def _bead_rows(present: Floats) -> slice:
 def _ends(
     photo: Photo, centre_px: Points, bead: slice, typical: float, strip: Strip
 ) -> NDArray[np.bool_]:
-    """Rows within half a width of a start or stop that lies in the photo: the bead is round there."""
+    """Rows within half a width of a start or stop in the photo, where the bead is round."""
     rows = np.arange(len(centre_px))
     reach = _ROUND_END * typical / float(strip.line.s[1] - strip.line.s[0])
     ends = np.zeros(len(rows), dtype=bool)
@@ -140,7 +140,7 @@ def _strays(offset: Floats, typical: float, strip: Strip) -> NDArray[np.bool_]:
     size = 2 * int(max(3, 0.5 * typical / step) // 2) + 1
     away = offset - median_filter(offset, size, mode="nearest")
     spread = 1.4826 * float(np.median(np.abs(away)))
-    return np.abs(away) > np.maximum(6 * spread, 0.06 * typical)
+    return np.asarray(np.abs(away) > np.maximum(6 * spread, 0.06 * typical))
 
 
 def _u_width(left: Toes, right: Toes, u_noise: Floats, width: Floats, plane: Plane) -> Floats:
@@ -148,7 +148,7 @@ def _u_width(left: Toes, right: Toes, u_noise: Floats, width: Floats, plane: Pla
     model = np.hypot(left.u_model, right.u_model) / np.sqrt(3)
     scale = plane.scale_relative_u * width
     residual = plane.residual * np.sqrt(2)
-    return np.sqrt(u_noise**2 + model**2 + scale**2 + residual**2)
+    return np.asarray(np.sqrt(u_noise**2 + model**2 + scale**2 + residual**2))
 
 
 def _confidence(

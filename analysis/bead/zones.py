@@ -53,7 +53,7 @@ def bead_likeness(
     """
     like_bead = np.minimum.reduce([look.distance(features) for look in bead])
     like_plate = np.minimum.reduce([look.distance(features) for look in plate])
-    return np.clip(0.5 * (like_plate - like_bead), -_CLIP, _CLIP)
+    return np.asarray(np.clip(0.5 * (like_plate - like_bead), -_CLIP, _CLIP))
 
 
 def fisher_direction(inside: Features, outside: Features) -> tuple[Floats, float]:
@@ -69,4 +69,6 @@ def fisher_direction(inside: Features, outside: Features) -> tuple[Floats, float
         direction = np.zeros(len(direction))
         direction[0] = norm = 1.0
     spread = float(np.sqrt(direction @ (a.covariance + b.covariance) @ direction / 2))
-    return direction / norm, float(direction @ (a.mean - b.mean)) / spread
+    return np.asarray(direction / norm, dtype=np.float64), float(
+        direction @ (a.mean - b.mean)
+    ) / spread

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from seamlog.command import config_options, force_option, group, output_option
+from seamlog.command import command, config_options, force_option, group, output_option
 from seamlog.errors import EvidenceError, OutputExists, UsageError
 from seamlog.outcome import Ending, Outcome
 
@@ -18,7 +18,7 @@ def bead() -> None:
     """Measure the bead on photos taken after the weld."""
 
 
-@bead.command("measure")
+@command("measure")
 @click.argument("photos", nargs=-1, type=click.Path(path_type=Path), metavar="[PHOTO]...")
 @click.option(
     "--session",
@@ -67,6 +67,9 @@ def measure(
     if output is not None:
         _write(output, assessed)
     return _outcome(assessed, output)
+
+
+bead.add_command(measure)
 
 
 def _check_output(output: Path | None, force: bool) -> None:
