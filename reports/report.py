@@ -10,14 +10,12 @@ import hashlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from seamlog import __version__, plugins
 from seamlog.files import write_bytes
-from seamlog.results import Part, Results
+from seamlog.results import Results
 
 from .content import AnyBlock, Section
-from .curves import Column, Link
+from .links import links_of
 from .page import Document, has_uplot, render
 from .parts import part_blocks
 from .run import KINDS, Run, anchor, utc_date
@@ -59,7 +57,7 @@ class Report:
             seamlog_version=__version__,
             interactive=has_uplot(),
             sections=[*self._sections(), *self._added],
-            links=[link for run in self._runs for link in _links(run)],
+            links=[link for run in self._runs for link in links_of(run)],
         )
 
     def write(self, path: Path, force: bool = False) -> Document:
@@ -100,29 +98,3 @@ class Report:
             for kind in kinds
             if kind not in claimed
         ]
-
-
-def _links(run: Run) -> list[Link]:
-    """Seam and time tied together by tables that hold both, the join before the log alone."""
-    return [
-        _link(run, part, name)
-        for part in sorted(run.parts, key=lambda part: part.part != "join")
-        for name, table in part.tables.items()
-        if {"s_mm", "stamp_ns"} <= set(table.columns)
-    ]
-
-
-def _link(run: Run, part: Part, table: str) -> Link:
-    """The tie of one table: places whose time is known, both ascending."""
-    columns = run.columns(part, table)
-    s_mm, seconds = columns["s_mm"], run.seconds(columns["stamp_ns"])
-    order = np.argsort(s_mm, kind="stable")
-    order = order[np.isfinite(s_mm[order]) & np.isfinite(seconds[order])]
-    latest = np.maximum.accumulate(np.concatenate(([-np.inf], seconds[order])))[:-1]
-    order = order[seconds[order] > latest]
-    return Link(
-        source=run.seam_domain(part),
-        target=run.time_domain,
-        source_x=Column(values=s_mm[order]),
-        target_x=Column(values=seconds[order]),
-    )

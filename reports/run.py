@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.errors import ResultsError
-from seamlog.results import Finding, Part, Place, Results, TableFile
+from seamlog.results import Finding, Part, Place, Results
 
 from .content import FindingLine, PlaceLink
 from .numbers import format_number
@@ -40,9 +40,6 @@ class Run:
         self.parts = results.parts()
         self.fingerprint = self._read()
         self._columns: dict[tuple[str, str], dict[str, NDArray[Any]]] = {}
-        self._joined = {
-            part.weld or part.index for part in self.of("join") if _has_places(part.tables)
-        }
         self.label = self._label()
         self.origin_ns = self._origin_ns()
 
@@ -75,14 +72,10 @@ class Run:
         return f"{self.index}/time"
 
     def seam_domain(self, part: Part, weld: int | None = None) -> str:
-        """Name of the axis along the seam of `part`'s weld.
-
-        A photo has an axis of its own until a join says which place of the seam is which of its.
-        """
-        number = weld or part.weld or part.index
-        if part.part == "bead" and number not in self._joined:
+        """Name of the axis along the seam of `part`'s weld; a photo has an axis of its own."""
+        if part.part == "bead":
             return f"{self.index}/photo/{part.index}"
-        return f"{self.index}/seam/{number}"
+        return f"{self.index}/seam/{weld or part.weld or part.index}"
 
     def end_ns(self) -> int | None:
         """End of the weld or recording as the parts state it; None if none does."""
@@ -147,10 +140,6 @@ class Run:
             if (stamps := self.columns(part, name)["stamp_ns"]).size and np.isfinite(stamps).any()
         ]
         return min(firsts, default=0)
-
-
-def _has_places(tables: dict[str, TableFile]) -> bool:
-    return any({"s_mm", "stamp_ns"} <= set(table.columns) for table in tables.values())
 
 
 def anchor(*names: str) -> str:

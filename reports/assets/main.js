@@ -7,7 +7,9 @@ const MOST_WORDS = 4;
 
 function wordsAt(bus, at, domain) {
   const words = [];
+  const onSeam = Array.from(at.keys()).some((key) => key.includes("/seam"));
   for (const [key, x] of at) {
+    if (onSeam && key.includes("/photo")) continue;
     words.push(key.includes("/time") ? `t = ${x.toFixed(2)} s` : `s = ${x.toFixed(1)} ${key.endsWith("/px") ? "px" : "mm"}`);
   }
   const told = new Set();
@@ -65,7 +67,8 @@ async function enliven() {
     figure.classList.add("is-live");
   }
   const photo = bus.photos.find((one) => one.isBead), plot = bus.plots[0];
-  const link = photo ? bus.links.find((one) => one.source === photo.domain) : bus.links[0];
+  const tie = photo && bus.links.find((one) => one.source === photo.domain);
+  const link = photo ? bus.links.find((one) => tie && one.source === tie.target) : bus.links[0];
   if (link) makeSlider(bus, link.source, link.source_x, "Along the seam");
   else if (photo) makeSlider(bus, photo.domain, photo.x, "Along the bead");
   else if (plot) makeSlider(bus, plot.spec.domain, plot.u.data[0], "Place");

@@ -27,6 +27,8 @@ from seamlog.results import (
 START_NS = 1_767_225_600_000_000_000
 WELD_START_S = 30.0
 SLOW_S_MM = 120.0
+OFFSET_MM = 3.0
+"""The photo's arc length begins half a width before the place of arc on."""
 Floats = NDArray[np.float64]
 SESSION = Input(name="weld.mcap", sha256="5e" * 32, bytes=18_304_112)
 PHOTO = Input(name="weld.bead.jpg", sha256="b0" * 32, bytes=912_004)
@@ -220,7 +222,9 @@ def _write_replay(results: Results, weld: dict[str, Floats], random: np.random.G
 
 def _write_bead(results: Results, weld: dict[str, Floats], random: np.random.Generator) -> None:
     s_mm = np.arange(1.0, 195.0, 0.25)
-    width = np.interp(s_mm, weld["s_mm"], weld["width"]) + random.normal(0, 0.03, s_mm.size)
+    width = np.interp(s_mm - OFFSET_MM, weld["s_mm"], weld["width"]) + random.normal(
+        0, 0.03, s_mm.size
+    )
     width[300:308] = np.nan
     flagged = np.zeros(s_mm.size, dtype=np.bool_)
     flagged[500:506] = True
@@ -255,7 +259,7 @@ def _write_bead(results: Results, weld: dict[str, Floats], random: np.random.Gen
                     lower=5.5,
                     upper=7.5,
                     verdict=Verdict.FAIL,
-                    place=Place(s_mm=SLOW_S_MM, weld=1),
+                    place=Place(s_mm=SLOW_S_MM + OFFSET_MM, weld=1),
                 )
             ],
             details={
@@ -337,7 +341,10 @@ def _write_join(results: Results, weld: dict[str, Floats]) -> None:
                     place=Place(s_mm=SLOW_S_MM, time_ns=time_ns, weld=1),
                 )
             ],
-            details={"causes": [{"channel": "weld_speed", "s_mm": SLOW_S_MM}]},
+            details={
+                "offset_mm": OFFSET_MM,
+                "causes": [{"channel": "weld_speed", "s_mm": SLOW_S_MM}],
+            },
         ),
         tables={"stations": (columns, units)},
     )

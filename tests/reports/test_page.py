@@ -9,7 +9,7 @@ from playwright.sync_api import Locator, Page
 from seamlog.reports.report import Report
 from seamlog.results import Results
 from tests.reports.conftest import Visitor
-from tests.reports.sample_results import SLOW_S_MM, write_sample
+from tests.reports.sample_results import OFFSET_MM, SLOW_S_MM, write_sample
 
 WIDTH = "#plot-0-bead-stations-width_mm"
 ERROR = "#plot-0-tracking-error-error_mm"
@@ -43,11 +43,11 @@ def _ink(canvas: Locator) -> int:
 
 
 def _seconds_at(sample: Results, s_mm: float) -> float:
-    """Report time of a place, from the join's table."""
+    """Report time of a place on the photo, from the join's table."""
     parts = {part.part: part for part in sample.parts()}
     join = sample.columns(parts["join"], "stations")
     origin = sample.columns(parts["identification"], "residual")["stamp_ns"][0]
-    return float(np.interp(s_mm, join["s_mm"], (join["stamp_ns"] - origin) / 1e9))
+    return float(np.interp(s_mm - OFFSET_MM, join["s_mm"], (join["stamp_ns"] - origin) / 1e9))
 
 
 def test_opens_alone_and_live(visitor: Visitor, sample_page: Path) -> None:
@@ -111,7 +111,7 @@ def test_a_finding_leads_to_its_place(visitor: Visitor, sample_page: Path) -> No
     page = visitor.open(sample_page).page
     _hover(page, WIDTH, 0.1)
     page.locator("#verdict a.place").first.click()
-    assert _cursor(page, WIDTH) == pytest.approx(SLOW_S_MM, abs=0.2)
+    assert _cursor(page, WIDTH) == pytest.approx(SLOW_S_MM + OFFSET_MM, abs=0.2)
 
 
 def test_arrow_keys_and_slider_move_the_cursor(visitor: Visitor, sample_page: Path) -> None:
