@@ -10,13 +10,12 @@ from typing import Any
 from numpy.typing import NDArray
 
 from seamlog import plugins
-from seamlog.channels import CAMERA_INFO_SCHEMA, CHANNELS, IMAGE_SCHEMA
+from seamlog.channels import CHANNELS, IMAGE_SCHEMA
 from seamlog.channels import Channel as Row
 from seamlog.clock import Clock
 from seamlog.errors import UsageError
 from seamlog.messages import encode, is_fixed, layout
 
-from .camera_info import encode_camera_info
 from .fixed import RING_BYTES, fixed_put, fixed_ring
 from .folder import OutTray
 from .gate import Gate
@@ -140,6 +139,4 @@ def _varying_channel(
 def _encoder(row: Row) -> Encode:
     if row.schema == IMAGE_SCHEMA:
         return picture_payload
-    if row.schema == CAMERA_INFO_SCHEMA:
-        return lambda *values: (encode_camera_info(*values), b"")
     return lambda *values: (encode(row, values), b"")

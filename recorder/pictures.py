@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from seamlog.mcap.records import Buffer
-from seamlog.messages import CdrWriter
+from seamlog.messages import image_head
 
 from .ring import MESSAGE, RECORD, RECORD_HEAD_BYTES
 from .varying import RAW_HEAD
@@ -20,14 +20,7 @@ def picture_payload(
 ) -> tuple[bytes, Buffer]:
     """CDR payload of a sensor_msgs/msg/CompressedImage in two parts, `data` not copied."""
     body = memoryview(data).cast("B")
-    writer = CdrWriter()
-    seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
-    writer.put("int32", seconds)
-    writer.put("uint32", nanoseconds)
-    writer.put("string", frame_id)
-    writer.put("string", image_format)
-    writer.put("uint32", len(body))
-    return writer.payload(), body
+    return image_head(stamp_ns, frame_id, image_format, len(body)), body
 
 
 def picture_encoder(channel_id: int) -> Encode:

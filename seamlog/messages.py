@@ -204,4 +204,13 @@ def encode(channel: Channel, values: Sequence[Any]) -> bytes:
 
 def encode_image(stamp_ns: int, frame_id: str, image_format: str, data: bytes) -> bytes:
     """CDR payload of a sensor_msgs/msg/CompressedImage."""
-    return encode(CHANNELS["/camera/image"], (stamp_ns, frame_id, image_format, data))
+    return image_head(stamp_ns, frame_id, image_format, len(data)) + data
+
+
+def image_head(stamp_ns: int, frame_id: str, image_format: str, size: int) -> bytes:
+    """What stands in front of the `size` bytes of the picture in a CompressedImage payload."""
+    writer = CdrWriter()
+    kinds = (TIME, "string", "string", "uint32")
+    for kind, value in zip(kinds, (stamp_ns, frame_id, image_format, size), strict=True):
+        writer.put(kind, value)
+    return writer.payload()

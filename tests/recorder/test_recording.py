@@ -47,7 +47,10 @@ def test_every_topic_of_the_table_can_be_logged(path: Path) -> None:
     square = np.eye(3).ravel()
     given: dict[str, tuple[Any, ...]] = {
         "/camera/image": ("camera", "jpeg", b"\xff\xd8"),
-        "/camera/info": ("camera", 480, 640, "plumb_bob", [0.0] * 5, square, square, [0.0] * 12),
+        "/camera/info": (
+            *("camera", 480, 640, "plumb_bob", [0.0] * 5, square, square, [0.0] * 12),
+            *(0, 0, 0, 0, 0, 0, False),
+        ),
         "/table/encoder": (0.1, 0.2),
         "/table/reference": (0.1, 0.2, 0.3),
         "/table/command": (1.5, np.bool_(True)),
