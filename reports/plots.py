@@ -93,7 +93,7 @@ def make_plot(
         return TimePlot(domain=run.time_domain, x_label="time", x_unit="s", **common)
     return SeamPlot(
         domain=run.seam_domain(part) + ("/px" if axis == "s_px" else ""),
-        x_label="along the seam",
+        x_label="along the bead on the photo" if part.part == "bead" else "along the seam",
         x_unit=split_unit(axis)[1],
         marks=_marks(part, axis),
         **common,

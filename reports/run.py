@@ -92,7 +92,8 @@ class Run:
             return None
         words, seconds = [], None
         if place.s_mm is not None:
-            words.append(f"s = {format_number(place.s_mm, 1)} mm")
+            where = " on the photo" if part.part == "bead" else ""
+            words.append(f"s = {format_number(place.s_mm, 1)} mm{where}")
         if place.time_ns is not None:
             seconds = self.second(place.time_ns)
             words.append(f"t = {format_number(seconds, 2)} s")

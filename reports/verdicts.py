@@ -59,9 +59,9 @@ def _counted(verdict: Verdict, criteria: Sequence[Criterion]) -> str:
     """How many of the limits that were assessed are met; '' if there is none to count."""
     judged = [c.verdict for c in criteria if c.verdict in _ASSESSED]
     failed = judged.count(Verdict.FAIL)
-    noun = "limit" if len(judged) == 1 else "limits"
     if verdict is Verdict.FAIL and failed:
-        return f"{failed} of {len(judged)} {noun} not met."
+        one = "The limit is not met."
+        return one if len(judged) == 1 else f"{failed} of {len(judged)} limits are not met."
     if verdict is Verdict.PASS and judged:
         return "The limit is met." if len(judged) == 1 else f"All {len(judged)} limits are met."
     return ""
