@@ -9,13 +9,34 @@ from typing import Any
 
 from seamlog.command import command, force_option, output_option
 from seamlog.errors import EvidenceError, SeamlogError
-from seamlog.files import check_output
+from seamlog.files import check_output, write_bytes
 from seamlog.outcome import Ending, Outcome
 from seamlog.progress import spinner
 from seamlog.results import Part, Results
 
 PLACE_TOLERANCE_MM = 10.0
 """How far from the planted place the join may point: about two bead widths."""
+
+
+CONFIGURATION = """\
+# What the demo's commands are given with --config. Limits are the user's own: here those of an
+# imaginary drawing; without them nothing is judged.
+[limits]
+tracking_error_mm = 1.0
+
+[bead]
+min_width_mm = 5.0
+max_width_mm = 7.0
+
+# Alternatives to the controller that welded. Below 2 mm/s a friction shape at the measured speed
+# does nothing, so both compensate friction at the reference's speed.
+[replay.controllers.paper]
+friction_speed = "reference"
+dead_zone_m_s = 0.0001
+
+[replay.controllers.pd]
+feed_forward = true
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +58,7 @@ def demo(output: Path, force: bool) -> Outcome:
     report = output / "report.html"
     output.mkdir(parents=True, exist_ok=True)
     check_output(report, force)
+    write_bytes(output / "seamlog.toml", CONFIGURATION.encode())
     steps = [_run(arguments) for arguments in _chain(output)]
     found, sentence = _compare(output / "weld.mcap", Results.open(output / "weld.results"))
     lines = [f"  {step.name:<8} {step.seconds:5.1f} s  {step.note}" for step in steps]
@@ -55,14 +77,15 @@ def _chain(folder: Path) -> list[list[str]]:
     photo, calibration = str(folder / "weld.bead.jpg"), str(folder / "weld.bead.calibration.json")
     replayed, report = str(folder / "replay.mcap"), str(folder / "report.html")
     controllers = ["--controller", "paper", "--controller", "pd", "--estimator", "gated_rls"]
-    into = ["-o", results, "--force"]
+    given = ["--config", str(folder / "seamlog.toml"), "--force"]
+    into = ["-o", results]
     return [
         ["record", "--source", "virtual-cell", "-o", session, "--force"],
         ["attach", session, photo, calibration, "--force"],
-        ["identify", session, *into],
-        ["replay", session, *controllers, "--results", results, "-o", replayed, "--force"],
-        ["bead", "measure", "--session", session, "--start", "left", *into],
-        ["analyze", session, "--start", "left", *into],
+        ["identify", session, *into, "--force"],
+        ["replay", session, *controllers, "--results", results, "-o", replayed, *given],
+        ["bead", "measure", "--session", session, "--start", "left", *into, *given],
+        ["analyze", session, "--start", "left", *into, *given],
         ["report", results, "-o", report, "--force"],
     ]
 
