@@ -22,13 +22,15 @@ class CoarsePath:
     """A found path: centre points in photo px (n, 2) with the bead's coarse half width in px.
 
     `evidence` is 0 to 1 per point. `rival` is the evidence of the best other band beside it,
-    relative to this one's: near 1 means that two beads (or a bead and its like) are in view.
+    relative to this one's: near 1 means that two beads (or a bead and its like) are in view;
+    `inner` the same for a narrower band inside it.
     """
 
     centre_px: Points
     half_width_px: NDArray[np.float64]
     evidence: NDArray[np.float64]
     rival: float
+    inner: float
 
 
 def find_path(photo: Photo) -> CoarsePath:
@@ -42,8 +44,8 @@ def find_path(photo: Photo) -> CoarsePath:
             "plate; take the photo from above with even light, or give the path by --session"
         )
     band, vertical = max(bands, key=lambda pair: pair[0].total)
-    rival = _rival(features, band, vertical)
-    return _in_photo(band, vertical, factor, rival)
+    rival, inner = _others(_sections(features, vertical), band)
+    return _in_photo(band, vertical, factor, rival, inner)
 
 
 def _sections(features: Features, vertical: bool) -> Features:
@@ -61,21 +63,27 @@ def _found(
     return find_band(sections, 3.0, widest, weight, slope=_ALONG)
 
 
-def _rival(features: Features, band: Band, vertical: bool) -> float:
-    sections = _sections(features, vertical)
-    weight = np.ones((sections.shape[0], sections.shape[1] + 1), dtype=np.float32)
+def _others(sections: Features, band: Band) -> tuple[float, float]:
+    """Evidence of the best band beside and of the best inside `band`, relative to its own."""
     columns = np.arange(sections.shape[1] + 1)
-    half = (band.right - band.left) / 2
-    middle = (band.right + band.left) / 2
-    near = np.abs(columns - middle[:, None]) < 1.6 * half[:, None]
-    weight[band.first : band.last + 1][near] = 0
-    other = find_band(sections, 3.0, 0.6 * sections.shape[1], weight, slope=_ALONG)
-    return other.total / band.total if other else 0.0
+    half = (band.right - band.left)[:, None] / 2
+    away = np.abs(columns - (band.right + band.left)[:, None] / 2)
+    beside = np.ones((len(sections), len(columns)), dtype=np.float32)
+    beside[band.first : band.last + 1][away < 1.6 * half] = 0
+    inside = np.zeros_like(beside)
+    inside[band.first : band.last + 1][away < 0.4 * half] = 1
+    narrower = max(4.0, 1.3 * float(np.median(half)))
+    found = (
+        find_band(sections, 3.0, 0.6 * sections.shape[1], beside, slope=_ALONG),
+        find_band(sections, 3.0, narrower, inside, slope=_ALONG),
+    )
+    rival, inner = (other.total / band.total if other else 0.0 for other in found)
+    return rival, inner
 
 
-def _in_photo(band: Band, vertical: bool, factor: float, rival: float) -> CoarsePath:
+def _in_photo(band: Band, vertical: bool, factor: float, rival: float, inner: float) -> CoarsePath:
     along = (np.arange(band.first, band.last + 1) * _ALONG + _ALONG // 2 + 0.5) * factor - 0.5
     across = (band.left + band.right) / 2 * factor - 0.5
     pair = (across, along) if vertical else (along, across)
     half = (band.right - band.left) / 2 * factor
-    return CoarsePath(np.column_stack(pair), half, band.evidence, rival)
+    return CoarsePath(np.column_stack(pair), half, band.evidence, rival, inner)

@@ -19,7 +19,7 @@ from .path import find_path
 from .plane import Plane, Points
 from .sampling import Strip, sample_strip
 from .toes import Extent, find_toes
-from .width import Toes, assemble
+from .width import BandEvidence, Toes, assemble
 from .zones import fisher_direction, zone
 
 Floats = NDArray[np.float64]
@@ -39,8 +39,7 @@ class _Path:
 
     points: Points
     half: float
-    evidence: float
-    rival: float
+    band: BandEvidence
 
 
 def measure_strip(
@@ -65,7 +64,7 @@ def measure_strip(
     rows_per_station, row_step = _row_step(plane, unit)
     fine = _sampled(photo, plane, path, half, unit, row_step, unit)
     toes = _refine(fine, _carried(strip, extent, fine), unit)
-    return assemble(photo, plane, fine, toes, rows_per_station, found.evidence, found.rival, start)
+    return assemble(photo, plane, fine, toes, rows_per_station, found.band, start)
 
 
 def _refuse_narrow(photo: Photo, width_px: float) -> None:
@@ -89,8 +88,7 @@ def _found_path(photo: Photo, plane: Plane) -> _Path:
     return _Path(
         points,
         float(np.median(coarse.half_width_px)) * unit,
-        float(coarse.evidence.mean()),
-        coarse.rival,
+        BandEvidence(float(coarse.evidence.mean()), coarse.rival, coarse.inner),
     )
 
 
@@ -116,7 +114,7 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     rows = (np.arange(band.first, band.last + 1) * 2).clip(0, len(line.s) - 1)
     points = line.points[rows] + middle[:, None] * line.normals[rows]
     half = float(np.median(band.right - band.left)) / 2 * step
-    return _Path(points, half, float(band.evidence.mean()), 0.0)
+    return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, 0.0))
 
 
 def _blocks(features: Features) -> Features:

@@ -8,8 +8,9 @@ from scipy.ndimage import median_filter
 
 from seamlog.errors import EvidenceError
 
+from .confidence import Doubt, Evidence, doubts, serious
 from .image import Photo
-from .measurement import END, BeadMeasurement
+from .measurement import END, TRUSTED, BeadMeasurement
 from .plane import Plane, Points
 from .sampling import Strip
 
@@ -17,8 +18,17 @@ Floats = NDArray[np.float64]
 
 _FAINT = 0.04
 """Noise of a toe, as a part of the width, above which a station is flagged."""
-_REFUSED = 0.08
+_REFUSED = 0.2
 _ROUND_END = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class BandEvidence:
+    """How evident the band was in the photo; see `confidence.Evidence`."""
+
+    evidence: float
+    rival: float
+    inner: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +59,7 @@ def assemble(
     strip: Strip,
     toes: tuple[Toes, Toes],
     rows_per_station: int,
-    evidence: float,
-    rival: float,
+    band: BandEvidence,
     start: str | None,
 ) -> BeadMeasurement:
     """Stations out of strip rows; `EvidenceError` when the evidence carries no width at all."""
@@ -63,11 +72,13 @@ def assemble(
     ends = _ends(photo, centre_px, bead, typical, strip)
     reasons[ends & (reasons == "")] = END
     flagged = reasons != ""
-    confidence = _confidence(left, right, flagged[bead], typical, evidence, rival, strip.step)
+    found = doubts(_evidence(toes, flagged[bead], typical, band, strip.step))
+    confidence = found[0].confidence
     if confidence < _REFUSED:
         raise EvidenceError(
-            f"{photo.name}: a band was found, but its edges cannot be told from the plate "
-            f"(confidence {confidence:.2f}); take a sharper photo with even light, from above"
+            f"{photo.name}: a band was found, but its width cannot be told (confidence "
+            f"{confidence:.2f}): {found[0].sentence}; take a sharper photo with even light, "
+            "from above"
         )
     pick = slice(bead.start + rows_per_station // 2, bead.stop, rows_per_station)
     u_noise = np.hypot(left.u_noise, right.u_noise)
@@ -88,7 +99,7 @@ def assemble(
         reason=tuple(str(reason) for reason in reasons[pick][order]),
         unit_per_px=strip.step,
         confidence=confidence,
-        warnings=_warnings(plane, typical / strip.step, rival, confidence, flagged[bead]),
+        warnings=_warnings(plane, found),
         starts_at=starts_at,
         direction_known=start is not None,
         open_start=_at_frame(photo, centre_px[pick][order][0], typical / strip.step),
@@ -151,43 +162,32 @@ def _u_width(left: Toes, right: Toes, u_noise: Floats, width: Floats, plane: Pla
     return np.asarray(np.sqrt(u_noise**2 + model**2 + scale**2 + residual**2))
 
 
-def _confidence(
-    left: Toes,
-    right: Toes,
+def _evidence(
+    toes: tuple[Toes, Toes],
     flagged: NDArray[np.bool_],
     typical: float,
-    evidence: float,
-    rival: float,
+    band: BandEvidence,
     step: float,
-) -> float:
-    """0 to 1: the weakest of what a trustworthy width needs, not their average."""
-    apart = min(left.distance, right.distance)
-    astray = max(float(np.median(toe.disagreement)) for toe in (left, right)) / max(typical, step)
-    parts = (
-        np.clip(apart / 1.2, 0, 1),
-        np.clip(evidence / 0.6, 0, 1),
-        np.clip((1.0 - float(flagged.mean())) / 0.7, 0, 1),
-        np.clip((1.1 - rival) / 0.4, 0, 1),
-        np.clip(typical / step / 30, 0, 1),
-        np.clip(1.3 - astray / 0.1, 0, 1),
+) -> Evidence:
+    astray = max(float(np.median(toe.disagreement)) for toe in toes)
+    return Evidence(
+        apart=min(toe.distance for toe in toes),
+        band=band.evidence,
+        flagged=float(flagged.mean()),
+        rival=band.rival,
+        inner=band.inner,
+        width_px=typical / step,
+        astray=astray / max(typical, step),
+        blur_px=min(toe.blur_px for toe in toes),
     )
-    return float(min(parts))
 
 
-def _warnings(
-    plane: Plane, width_px: float, rival: float, confidence: float, flagged: NDArray[np.bool_]
-) -> tuple[str, ...]:
-    warnings = []
+def _warnings(plane: Plane, found: list[Doubt]) -> tuple[str, ...]:
+    warnings = serious(found)
     if plane.unit == "px":
-        warnings.append("no calibration: widths are in pixels, not in millimetres")
-    if width_px < 30:
-        warnings.append(f"the bead is only {width_px:.0f} px across; 30 or more are wanted")
-    if rival > 0.7:
-        warnings.append("another band in the photo looks as much like a bead")
-    if confidence < 0.5:
-        warnings.append(f"confidence is low ({confidence:.2f}): check the overlay")
-    if flagged.mean() > 0.1:
-        warnings.append(f"{100 * flagged.mean():.0f} % of the stations are flagged")
+        warnings.insert(0, "no calibration: widths are in pixels, not in millimetres")
+    if found[0].confidence < TRUSTED:
+        warnings.append(f"confidence is low ({found[0].confidence:.2f}): check the overlay")
     return tuple(warnings)
 
 
