@@ -1,0 +1,57 @@
+"""How far a measured width may be trusted: what could be wrong with it, each as a doubt."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What a width rests on.
+
+    `apart`: distance of bead and plate at the worse toe, in standard deviations. `band`: evidence
+    of the coarse band, 0 to 1. `flagged`: part of the stations. `rival` and `inner`: evidence of
+    the best band beside and inside the found one, relative to it. `width_px`; `astray`: distance
+    between the sharpest edge and the change of looks, part of the width; `blur_px` of the sharper
+    toe.
+    """
+
+    apart: float
+    band: float
+    flagged: float
+    rival: float
+    inner: float
+    width_px: float
+    astray: float
+    blur_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """One thing that could be wrong: `confidence` 0 to 1 that it is not, and what it would be."""
+
+    confidence: float
+    sentence: str
+
+
+def doubts(evidence: Evidence) -> list[Doubt]:
+    """All doubts, the worst first; the confidence of a width is that of its worst doubt."""
+    e = evidence
+    nested = np.clip((e.inner - 0.6) / 0.2, 0, 1) * np.clip((e.blur_px - 2.0) / 2.0, 0, 1)
+    found = [
+        (e.apart / 1.2, "bead and plate look alike at a toe"),
+        (e.band / 0.6, "hardly any band differs from both its sides"),
+        ((1 - e.flagged) / 0.7, f"{100 * e.flagged:.0f} % of the stations are flagged"),
+        ((1.1 - e.rival) / 0.4, "another band in the photo looks as much like a bead"),
+        (e.width_px / 30, f"the bead is only {e.width_px:.0f} px across, 30 or more are wanted"),
+        (1.3 - e.astray / 0.1, "the sharpest edges are not where the looks change"),
+        (1 - 0.8 * nested, "its edges are soft and a narrower band lies inside: a heat tint?"),
+    ]
+    judged = [Doubt(float(np.clip(value, 0, 1)), sentence) for value, sentence in found]
+    return sorted(judged, key=lambda doubt: doubt.confidence)
+
+
+def serious(found: Sequence[Doubt]) -> list[str]:
+    """Sentences of the doubts that a person should know."""
+    return [doubt.sentence for doubt in found if doubt.confidence < 0.9]
