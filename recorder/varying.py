@@ -63,30 +63,18 @@ class VaryingWriter:
             head = self._message_head(stamp_ns, len(start) + len(rest)) + start
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
-        at = self._reserve(len(head) + len(rest))
-        if at is None:
-            return False
-        body = at + len(head)
-        self._ring.data[at:body] = head
-        self._ring.data[body : body + len(rest)] = rest
-        return self._publish(at, len(head) + len(rest))
+        return self._store(head, rest)
 
     def put_frame(self, stamp_ns: int, image: NDArray[Any]) -> bool:
         """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""
         if get_ident() != self._gate.owner:
             return self._gate.refuse_foreign()
         try:
-            head = self._raw_head(stamp_ns, image)
+            pixels, shape = _pixels(image)
+            head = self._raw_head(stamp_ns, len(pixels), shape)
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
-        at = self._reserve(len(head) + image.size)
-        if at is None:
-            return False
-        body = at + len(head)
-        self._ring.data[at:body] = head
-        place = np.frombuffer(self._ring.data, np.uint8, image.size, body)
-        np.copyto(place.reshape(image.shape), image)
-        return self._publish(at, len(head) + image.size)
+        return self._store(head, pixels)
 
     def stop(self) -> None:
         """Take nothing more; the gate is closed already."""
@@ -102,14 +90,21 @@ class VaryingWriter:
             MESSAGE, length, self._channel_id, self._sequence(), log_time_ns, stamp_ns
         )
 
-    def _raw_head(self, stamp_ns: int, image: NDArray[Any]) -> bytes:
+    def _raw_head(self, stamp_ns: int, size: int, shape: tuple[int, int, int]) -> bytes:
         _check_stamp(stamp_ns)
-        check_image(image)
-        length = RAW_HEAD.size - RECORD_HEAD_BYTES + image.size
+        length = RAW_HEAD.size - RECORD_HEAD_BYTES + size
         log_time_ns = self._now() + self._anchor
-        rows, columns, *samples = image.shape
-        shape = (rows, columns, *(samples or (1,)))
         return RAW_HEAD.pack(RAW_FRAME, length, self._sequence(), log_time_ns, stamp_ns, *shape)
+
+    def _store(self, head: bytes, rest: Buffer) -> bool:
+        size = len(head) + len(rest)
+        at = self._reserve(size)
+        if at is None:
+            return False
+        body = at + len(head)
+        self._ring.data[at:body] = head
+        self._ring.data[body : at + size] = rest
+        return self._publish(at, size)
 
     def _reserve(self, size: int) -> int | None:
         """Offset for a record of `size` bytes, or None if it was turned away."""
@@ -119,7 +114,7 @@ class VaryingWriter:
         capacity = self._ring.capacity
         rest = capacity - self._head % capacity
         end = self._head + size + (rest if rest < size else 0)
-        if self._gate.is_open and self._gate.has_room(lambda: self._fits(end)):
+        if self._gate.is_open and (self._fits(end) or self._gate.has_room(lambda: self._fits(end))):
             return self._start(rest, size)
         if not self._gate.is_open:
             self._gate.refuse_closed()
@@ -153,12 +148,17 @@ def _check_stamp(stamp_ns: int) -> None:
         raise ValueError(f"stamp_ns must be from 0 to 2**63 - 1, got {stamp_ns}")
 
 
-def check_image(image: NDArray[Any]) -> None:
-    """Refuse with `ValueError` what is no picture of the kind that can be recorded."""
-    form: tuple[int, ...] = getattr(image, "shape", ())
-    if getattr(image, "dtype", None) != np.uint8:
-        raise ValueError(f"a picture is a numpy array of uint8, got {type(image).__name__}")
-    if not (len(form) == 2 or (len(form) == 3 and form[2] == 3)) or 0 in form:
-        raise ValueError(f"a picture has shape (rows, columns) or (rows, columns, 3), got {form}")
+def _pixels(image: Any) -> tuple[memoryview, tuple[int, int, int]]:
+    """The bytes of a picture and its rows, columns and samples; `ValueError` if it is none."""
+    view = memoryview(image)
+    if not view.c_contiguous:
+        view = memoryview(np.ascontiguousarray(image))
+    form = view.shape or ()
+    if view.format != "B" or len(form) not in (2, 3) or 0 in form or form[2:] not in ((), (3,)):
+        raise ValueError(
+            "a picture is uint8 of shape (rows, columns) or (rows, columns, 3), got "
+            f"{view.format!r} of shape {form}"
+        )
     if max(form) > _LARGEST_PX:
         raise ValueError(f"a picture of {form[1]} x {form[0]} px is larger than JPEG allows")
+    return view.cast("B"), (form[0], form[1], form[2] if len(form) == 3 else 1)

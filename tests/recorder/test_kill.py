@@ -19,7 +19,7 @@ from seamlog.recorder.folder import root
 from tests.recorder.sessions import final_accounts, read_metadata, read_session
 
 LOOP = Path(__file__).with_name("killed_loop.py")
-KILLS = 22
+KILLS = 20
 
 
 def wait_for(condition: Callable[[], bool], seconds: float = 30.0) -> None:
