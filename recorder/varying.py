@@ -152,7 +152,7 @@ def _pixels(image: Any) -> tuple[memoryview, tuple[int, int, int]]:
     """The bytes of a picture and its rows, columns and samples; `ValueError` if it is none."""
     view = memoryview(image)
     if not view.c_contiguous:
-        view = memoryview(np.ascontiguousarray(image))
+        view = np.ascontiguousarray(image).data
     form = view.shape or ()
     if view.format != "B" or len(form) not in (2, 3) or 0 in form or form[2:] not in ((), (3,)):
         raise ValueError(
