@@ -7,7 +7,7 @@ import threading
 import time
 import uuid
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
@@ -25,6 +25,7 @@ from .channel import Channel, known_row, make_channel, producer_name
 from .folder import RESERVED, OutTray, Recording, abandoned_folders, make_folder, read_recording
 from .gate import Gate
 from .launch import WritingProcess, claim_partial
+from .put_source import Put
 from .ring import Ring
 
 _log = logging.getLogger("seamlog.recorder")
@@ -105,13 +106,13 @@ class Recorder:
     def log(self, topic: str, stamp_ns: int | None = None, **fields: Any) -> bool:
         """Log one message by field names; False if it was not accepted."""
         try:
-            put = self._mine.puts[topic]
+            put: Put = self._mine.puts[topic]
         except (AttributeError, KeyError):
             put = self._late_put(topic)
         if stamp_ns is None:
             stamp_ns = self.clock.now_ns()
         try:
-            return bool(put(stamp_ns, **fields))
+            return put(stamp_ns, **fields)
         except TypeError:
             return self._channels[topic, get_ident()].refuse_names(fields)
 
@@ -195,7 +196,7 @@ class Recorder:
         waits = self._recording.pace == "simulated"
         return Gate(topic, ring, waits, self.strict, self._process.is_alive)
 
-    def _late_put(self, topic: str) -> Callable[..., bool]:
+    def _late_put(self, topic: str) -> Put:
         channel = self._late_channel(topic)
         if channel is None:
             return lambda *_, **__: self._turn_away(topic)
