@@ -17,6 +17,7 @@
     ├── HardwareError                    a device, driver or extra is missing
     │   ├── SourceMissing
     │   └── SpaceMissing (OSError)
+    ├── PluginFailed                     a plug-in or the user's own code raised or gave nonsense
     ├── EvidenceError                    the data cannot tell; an answer would be invented
     └── RecordingError                   misuse of the recorder by the live loop (strict mode)
 
@@ -99,6 +100,10 @@ class SourceMissing(HardwareError):
 
 class SpaceMissing(HardwareError, OSError):
     """Not enough space in shared memory or on the disk."""
+
+
+class PluginFailed(SeamlogError):
+    """A plug-in or the user's own code raised, or gave what is no answer."""
 
 
 class EvidenceError(SeamlogError):

@@ -11,7 +11,14 @@ from seamlog.errors import EvidenceError
 from seamlog.progress import track
 
 from .counterfactual import Prediction, make_scene, predict
-from .factories import ControllerChoice, EstimatorChoice, choose_controller, choose_estimator
+from .factories import (
+    ControllerChoice,
+    EstimatorChoice,
+    choose_controller,
+    choose_estimator,
+    choose_own_controller,
+    controller_label,
+)
 from .inputs import ReplayInputs
 from .model import AxisModel, identify_model
 from .self_check import SelfCheck, check_replay, recorded_choice
@@ -141,7 +148,10 @@ def replay(
 def _controller(
     name: str, live: LiveController | None, settings: ReplaySettings
 ) -> ControllerChoice:
-    values = settings.controllers.get(name)
+    label = controller_label(name)
+    values = settings.controllers.get(label)
+    if label != name:
+        return choose_own_controller(name, values or {})
     if values is None:
         values = live.config if live and live.name == name else {}
     return choose_controller(name, values)
