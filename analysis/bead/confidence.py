@@ -12,7 +12,9 @@ class Evidence:
 
     `apart`: distance of bead and plate at the worse toe, in standard deviations. `band`: evidence
     of the coarse band, 0 to 1. `flagged`: part of the stations. `rival` and `inner`: evidence of
-    the best band beside and inside the found one, relative to it. `width_px`; `astray`: distance
+    the best band beside and inside the found one, relative to it; `nested`: it lies itself inside
+    a more evident one. `step_grey`: the weaker toe's step in grey levels; `lengths`: length of the
+    bead in widths (inf where it runs out of the photo at both ends). `width_px`; `astray`: distance
     between the sharpest edge and the change of looks, part of the width; `blur_px` of the sharper
     toe.
     """
@@ -22,6 +24,9 @@ class Evidence:
     flagged: float
     rival: float
     inner: float
+    nested: bool
+    step_grey: float
+    lengths: float
     width_px: float
     astray: float
     blur_px: float
@@ -38,7 +43,7 @@ class Doubt:
 def doubts(evidence: Evidence) -> list[Doubt]:
     """All doubts, the worst first; the confidence of a width is that of its worst doubt."""
     e = evidence
-    nested = np.clip((e.inner - 0.6) / 0.2, 0, 1) * np.clip((e.blur_px - 2.0) / 2.0, 0, 1)
+    tinted = np.clip((e.inner - 0.6) / 0.2, 0, 1) * np.clip((e.blur_px - 2.0) / 2.0, 0, 1)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),
@@ -46,7 +51,10 @@ def doubts(evidence: Evidence) -> list[Doubt]:
         ((1.1 - e.rival) / 0.4, "another band in the photo looks as much like a bead"),
         (e.width_px / 30, f"the bead is only {e.width_px:.0f} px across, 30 or more are wanted"),
         (1.3 - e.astray / 0.1, "the sharpest edges are not where the looks change"),
-        (1 - 0.8 * nested, "its edges are soft and a narrower band lies inside: a heat tint?"),
+        (e.step_grey / 8, f"a toe's step is {e.step_grey:.1f} grey levels only"),
+        (e.lengths / 10, f"it is {e.lengths:.1f} times as long as wide: a bead is longer"),
+        (0.45 if e.nested else 1.0, "it lies inside a broader band that is as evident"),
+        (1 - 0.8 * tinted, "its edges are soft and a narrower band lies inside: a heat tint?"),
     ]
     judged = [Doubt(float(np.clip(value, 0, 1)), sentence) for value, sentence in found]
     return sorted(judged, key=lambda doubt: doubt.confidence)

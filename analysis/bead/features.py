@@ -42,11 +42,12 @@ def smoothed(features: Features, across: float, along: float) -> Features:
 def strip_features(opponent: NDArray[np.float32], reach_px: float) -> Features:
     """As `stack_texture`, for strips: the texture's outer border is drawn in by its own reach.
 
-    A window that touches the bead's edge sees that edge as detail; without the correction the
-    texture alone would put each toe too far out.
+    A window that touches the bead's edge sees that edge as detail, and the logarithm lifts its
+    Gaussian tail to some 2.5 reaches; without the correction the texture alone would put each toe
+    that much too far out.
     """
     features = stack_texture(opponent, reach_px)
-    wide = 2 * round(1.5 * reach_px) + 1
+    wide = 2 * round(2.5 * reach_px) + 1
     features[..., -1] = cv2.erode(features[..., -1], np.ones((1, wide), np.uint8))
     return features
 

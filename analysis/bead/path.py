@@ -13,6 +13,8 @@ from .image import Photo
 from .plane import Points
 
 _LONGEST_PX = 288
+_NESTED = 0.7
+"""Relative evidence from which on a band inside the found one may be the bead itself."""
 _ALONG = 2
 """Reduced px per section."""
 
@@ -33,8 +35,12 @@ class CoarsePath:
     inner: float
 
 
-def find_path(photo: Photo) -> CoarsePath:
-    """The most evident bead-like band in the photo; `EvidenceError` without one."""
+def find_paths(photo: Photo) -> list[CoarsePath]:
+    """The most evident bead-like band in the photo, then the narrower one inside it, if any.
+
+    A heat tint is the most evident band of some photos, the bead lies inside. `EvidenceError`
+    without any band.
+    """
     features, factor = reduced_features(photo, _LONGEST_PX)
     found = [_found(features, vertical) for vertical in (False, True)]
     bands = [(band, vertical) for vertical, band in zip((False, True), found, strict=True) if band]
@@ -44,8 +50,13 @@ def find_path(photo: Photo) -> CoarsePath:
             "plate; take the photo from above with even light, or give the path by --session"
         )
     band, vertical = max(bands, key=lambda pair: pair[0].total)
-    rival, inner = _others(_sections(features, vertical), band)
-    return _in_photo(band, vertical, factor, rival, inner)
+    sections = _sections(features, vertical)
+    beside, inside = _beside(sections, band), _inside(sections, band)
+    outer = _in_photo(band, vertical, factor, _relative(beside, band), _relative(inside, band))
+    if inside is None or outer.inner < _NESTED:
+        return [outer]
+    deeper = _relative(_inside(sections, inside), inside)
+    return [outer, _in_photo(inside, vertical, factor, outer.rival, deeper)]
 
 
 def _sections(features: Features, vertical: bool) -> Features:
@@ -63,22 +74,30 @@ def _found(
     return find_band(sections, 3.0, widest, weight, slope=_ALONG)
 
 
-def _others(sections: Features, band: Band) -> tuple[float, float]:
-    """Evidence of the best band beside and of the best inside `band`, relative to its own."""
+def _relative(other: Band | None, band: Band) -> float:
+    return other.total / band.total if other else 0.0
+
+
+def _away(sections: Features, band: Band) -> NDArray[np.float64]:
+    """Distance of each column edge from the band's middle, in half widths, by row of the band."""
     columns = np.arange(sections.shape[1] + 1)
-    half = (band.right - band.left)[:, None] / 2
-    away = np.abs(columns - (band.right + band.left)[:, None] / 2)
-    beside = np.ones((len(sections), len(columns)), dtype=np.float32)
-    beside[band.first : band.last + 1][away < 1.6 * half] = 0
-    inside = np.zeros_like(beside)
-    inside[band.first : band.last + 1][away < 0.4 * half] = 1
-    narrower = max(4.0, 1.3 * float(np.median(half)))
-    found = (
-        find_band(sections, 3.0, 0.6 * sections.shape[1], beside, slope=_ALONG),
-        find_band(sections, 3.0, narrower, inside, slope=_ALONG),
-    )
-    rival, inner = (other.total / band.total if other else 0.0 for other in found)
-    return rival, inner
+    distance = np.abs(columns - (band.right + band.left)[:, None] / 2)
+    return np.asarray(distance / ((band.right - band.left)[:, None] / 2))
+
+
+def _beside(sections: Features, band: Band) -> Band | None:
+    """The best band with its middle outside `band` and its margin."""
+    allowed = np.ones((len(sections), sections.shape[1] + 1), dtype=np.float32)
+    allowed[band.first : band.last + 1][_away(sections, band) < 1.6] = 0
+    return find_band(sections, 3.0, 0.6 * sections.shape[1], allowed, slope=_ALONG)
+
+
+def _inside(sections: Features, band: Band) -> Band | None:
+    """The best band of at most two thirds of the width near the middle of `band`."""
+    allowed = np.zeros((len(sections), sections.shape[1] + 1), dtype=np.float32)
+    allowed[band.first : band.last + 1][_away(sections, band) < 0.4] = 1
+    narrower = max(4.0, 0.65 * float(np.median(band.right - band.left)))
+    return find_band(sections, 3.0, narrower, allowed, slope=_ALONG)
 
 
 def _in_photo(band: Band, vertical: bool, factor: float, rival: float, inner: float) -> CoarsePath:

@@ -1,5 +1,6 @@
 """The strip method: straighten the bead, find its toes, recentre, repeat, refine below a pixel."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -15,7 +16,7 @@ from .edge_model import EdgePlaces, locate_edges
 from .features import Features, smoothed, stack_texture, strip_features
 from .image import Photo
 from .measurement import BeadMeasurement
-from .path import find_path
+from .path import find_paths
 from .plane import Plane, Points
 from .sampling import Strip, sample_strip
 from .toes import Extent, find_toes
@@ -27,7 +28,10 @@ Floats = NDArray[np.float64]
 STATION_MM = 0.25
 STATION_PX = 2.0
 NARROWEST_PX = 8.0
+_CLEAR = 0.5
+"""Confidence from which on no other candidate is tried."""
 _COARSE = 40
+"""Columns of half the bead in the strip that toes are traced in."""
 _ALONG_PX = 2.0
 _ALONG_WIDTHS = 0.03
 """Gaussian averaging along the seam: this many px, or this part of the width if that is more."""
@@ -51,7 +55,34 @@ def measure_strip(
     `EvidenceError` where no bead can be told from the plate and `ImageError` for one narrower
     than 8 px.
     """
-    found = _given_path(photo, plane, prior) if prior is not None else _found_path(photo, plane)
+    if prior is not None:
+        return _measure(photo, plane, _given_path(photo, plane, prior), start)
+    return _most_trusted(photo, plane, _found_paths(photo, plane), start)
+
+
+def _most_trusted(
+    photo: Photo, plane: Plane, paths: Sequence[_Path], start: str | None
+) -> BeadMeasurement:
+    """The first measurement that can be trusted, else the one with the least doubt."""
+    best: BeadMeasurement | None = None
+    refusal: Exception | None = None
+    for path in paths:
+        try:
+            measured = _measure(photo, plane, path, start)
+        except (EvidenceError, ImageError) as error:
+            refusal = refusal or error
+            continue
+        if measured.confidence >= _CLEAR:
+            return measured
+        if best is None or measured.confidence > best.confidence:
+            best = measured
+    if best is None:
+        assert refusal is not None
+        raise refusal
+    return best
+
+
+def _measure(photo: Photo, plane: Plane, found: _Path, start: str | None) -> BeadMeasurement:
     unit = plane.unit_per_px(plane.to_px(found.points))
     _refuse_narrow(photo, 2 * found.half / unit)
     path, half = found.points, found.half
@@ -81,15 +112,13 @@ def _row_step(plane: Plane, unit: float) -> tuple[int, float]:
     return count, station / count
 
 
-def _found_path(photo: Photo, plane: Plane) -> _Path:
-    coarse = find_path(photo)
-    points = plane.to_plane(coarse.centre_px)
-    unit = plane.unit_per_px(coarse.centre_px)
-    return _Path(
-        points,
-        float(np.median(coarse.half_width_px)) * unit,
-        BandEvidence(float(coarse.evidence.mean()), coarse.rival, coarse.inner),
-    )
+def _found_paths(photo: Photo, plane: Plane) -> list[_Path]:
+    paths = []
+    for order, coarse in enumerate(find_paths(photo)):
+        half = float(np.median(coarse.half_width_px)) * plane.unit_per_px(coarse.centre_px)
+        band = BandEvidence(float(coarse.evidence.mean()), coarse.rival, coarse.inner, order > 0)
+        paths.append(_Path(plane.to_plane(coarse.centre_px), half, band))
+    return paths
 
 
 def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
@@ -114,7 +143,7 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     rows = (np.arange(band.first, band.last + 1) * 2).clip(0, len(line.s) - 1)
     points = line.points[rows] + middle[:, None] * line.normals[rows]
     half = float(np.median(band.right - band.left)) / 2 * step
-    return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, 0.0))
+    return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, 0.0, False))
 
 
 def _blocks(features: Features) -> Features:

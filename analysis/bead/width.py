@@ -29,6 +29,7 @@ class BandEvidence:
     evidence: float
     rival: float
     inner: float
+    nested: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +70,12 @@ def assemble(
     reasons = _reasons(left, right, width, typical, strip)
     left_px, right_px, centre_px = _points(plane, strip, left, right)
     bead = _bead_rows(left.present)
-    ends = _ends(photo, centre_px, bead, typical, strip)
-    reasons[ends & (reasons == "")] = END
+    round_ends = _ends(photo, centre_px, bead, typical, strip)
+    reasons[round_ends & (reasons == "")] = END
     flagged = reasons != ""
-    found = doubts(_evidence(toes, flagged[bead], typical, band, strip.step))
+    ends = [_at_frame(photo, centre_px[end], typical / strip.step) for end in _ends_of(bead)]
+    length = np.inf if all(ends) else float(np.ptp(strip.line.s[bead]))
+    found = doubts(_evidence(toes, flagged[bead], typical, band, strip.step, length))
     confidence = found[0].confidence
     if confidence < _REFUSED:
         raise EvidenceError(
@@ -118,6 +121,10 @@ def _bead_rows(present: Floats) -> slice:
     return slice(first, last)
 
 
+def _ends_of(bead: slice) -> tuple[int, int]:
+    return int(bead.start), int(bead.stop) - 1
+
+
 def _ends(
     photo: Photo, centre_px: Points, bead: slice, typical: float, strip: Strip
 ) -> NDArray[np.bool_]:
@@ -125,7 +132,7 @@ def _ends(
     rows = np.arange(len(centre_px))
     reach = _ROUND_END * typical / float(strip.line.s[1] - strip.line.s[0])
     ends = np.zeros(len(rows), dtype=bool)
-    for end in (bead.start, bead.stop - 1):
+    for end in _ends_of(bead):
         if not _at_frame(photo, centre_px[end], typical / strip.step):
             ends |= np.abs(rows - end) < reach
     return ends
@@ -168,6 +175,7 @@ def _evidence(
     typical: float,
     band: BandEvidence,
     step: float,
+    length: float,
 ) -> Evidence:
     astray = max(float(np.median(toe.disagreement)) for toe in toes)
     return Evidence(
@@ -176,6 +184,9 @@ def _evidence(
         flagged=float(flagged.mean()),
         rival=band.rival,
         inner=band.inner,
+        nested=band.nested,
+        step_grey=min(float(np.median(np.abs(toe.height))) for toe in toes),
+        lengths=length / typical,
         width_px=typical / step,
         astray=astray / max(typical, step),
         blur_px=min(toe.blur_px for toe in toes),
