@@ -1,6 +1,6 @@
 """The figures of a replay: recorded and predicted errors, and the self-check."""
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 from seamlog.analysis.axis_record import FloatArray
 from seamlog.results import Figure
 
-from .counterfactual import Prediction
+from .counterfactual import Judge, Prediction
 from .run import Replay
-
-Judge = Callable[[FloatArray], float]
 
 
 def rms_mm(error_m: FloatArray) -> float:
@@ -25,13 +23,14 @@ def peak_mm(error_m: FloatArray) -> float:
 
 
 JUDGES: dict[str, Judge] = {"rms": rms_mm, "peak": peak_mm}
+UNSTABLE = "the predicted loop is unstable: its motion grows without bound"
 _MISS_UNKNOWN = "the recorded controller is not known: how well the model predicts was not checked"
 
 
 def replay_figures(found: Replay, judged: NDArray[np.bool_]) -> list[Figure]:
     """Self-check first, then rms and peak over the rows `judged`."""
     figures = [*_self_check_figures(found), *_recorded_figures(found, judged)]
-    misses = model_misses(found, judged)
+    misses = unexplained_misses(found, judged)
     reason = found.model_reason or "only a shadow replay was asked for: it predicts no error"
     for run in found.controllers:
         label = f"{run.choice.name} (counterfactual)"
@@ -43,12 +42,33 @@ def model_misses(found: Replay, judged: NDArray[np.bool_]) -> dict[str, float] |
     """Relative difference of predicted and recorded figures under the recorded controller.
 
     None where that prediction could not be made. It is the model's error in a case whose answer
-    is known, and goes into the uncertainty of the cases whose answer is not.
+    is known.
     """
     if found.recorded is None:
         return None
-    measured, predicted = found.record.error_m[judged], found.recorded.error_m[judged]
-    return {kind: abs(judge(predicted) / judge(measured) - 1) for kind, judge in JUDGES.items()}
+    measured = found.record.error_m[judged]
+    return {
+        kind: abs(found.recorded.best(judge, judged) / judge(measured) - 1)
+        for kind, judge in JUDGES.items()
+    }
+
+
+def unexplained_misses(found: Replay, judged: NDArray[np.bool_]) -> dict[str, float] | None:
+    """What of `model_misses` the ensemble's spread does not contain already.
+
+    It goes into the uncertainty of the cases whose answer is not known.
+    """
+    misses, own = model_misses(found, judged), found.recorded
+    if misses is None or own is None:
+        return None
+    spreads = {
+        kind: own.spread(judge, judged) / own.best(judge, judged) for kind, judge in JUDGES.items()
+    }
+    return {kind: _beyond(misses[kind], spreads[kind]) for kind in JUDGES}
+
+
+def _beyond(whole: float, part: float) -> float:
+    return float(np.sqrt(max(0.0, whole**2 - part**2)))
 
 
 def _recorded_figures(found: Replay, judged: NDArray[np.bool_]) -> list[Figure]:
@@ -87,13 +107,25 @@ def _error_figures(
             reason=reason,
         )
         if prediction is not None:
-            value, spread = prediction.figure(judge, judged)
-            miss = 0.0 if misses is None else misses[kind] * value
-            doubt = _MISS_UNKNOWN if misses is None else ""
-            update = {"value": value, "u": float(np.hypot(spread, miss)), "reason": doubt}
-            figure = figure.model_copy(update=update)
+            figure = figure.model_copy(update=_judged(prediction, judge, kind, judged, misses))
         figures.append(figure)
     return figures
+
+
+def _judged(
+    prediction: Prediction,
+    judge: Judge,
+    kind: str,
+    judged: NDArray[np.bool_],
+    misses: dict[str, float] | None,
+) -> dict[str, Any]:
+    """Value, u and reason of one figure."""
+    if not prediction.is_bounded:
+        return {"reason": UNSTABLE}
+    value, spread = prediction.best(judge, judged), prediction.spread(judge, judged)
+    miss = 0.0 if misses is None else misses[kind] * value
+    doubt = _MISS_UNKNOWN if misses is None else ""
+    return {"value": value, "u": float(np.hypot(spread, miss)), "reason": doubt}
 
 
 def _self_check_figures(found: Replay) -> list[Figure]:

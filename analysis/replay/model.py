@@ -1,4 +1,4 @@
-"""The identified axis as a plant: in the command's unit, with the covariance of its parameters."""
+"""The identified axis as a plant: in the command's unit, with all that is known of its doubt."""
 
 from dataclasses import dataclass, replace
 
@@ -13,32 +13,83 @@ from seamlog.analysis.live_controller import LiveController
 from seamlog.contracts import Axis
 from seamlog.errors import EvidenceError
 
+from .explanation import Explanation, explain
 from .stribeck import with_stribeck
+from .windows import Windows, motion_windows
 
 _SUBSTEP_S = 0.005
 _NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 _LEAST_SHARE = 1e-3
+_LARGEST_NOISE_SHARE = 0.02
+"""Left-over squares beyond which acceleration by positions would bias the inertia."""
+
+
+@dataclass(frozen=True)
+class RippleForce:
+    """Force that repeats with the screw, in the command's unit, opposing a positive command.
+
+    sine sin(2 pi x / pitch) + cosine cos(2 pi x / pitch); both 0: none.
+    """
+
+    sine: float = 0.0
+    cosine: float = 0.0
+    pitch_m: float = 1.0
 
 
 @dataclass(frozen=True)
 class AxisModel:
-    """`covariance` (4, 4) is of inertia, viscous friction, Coulomb friction and offset."""
+    """The axis and what is known of it beyond a friction law.
+
+    `explanations` (best first) stem from `windows` of finely resolved positions; without them
+    `covariance` (4, 4) is of inertia, viscous friction, Coulomb friction and offset.
+    """
 
     axis: Axis
     covariance: FloatArray
     method: str
+    ripple: RippleForce = RippleForce()
+    windows: Windows | None = None
+    explanations: tuple[Explanation, ...] = ()
 
-    def drawn(self, random: np.random.Generator) -> Axis:
+    def drawn(self, random: np.random.Generator) -> tuple[Axis, RippleForce]:
         """One axis from the parameters' distribution; nothing physical falls below 0."""
-        mean = np.array([getattr(self.axis, name) for name in _NAMES])
-        values = random.multivariate_normal(mean, self.covariance, method="svd")
-        values[:3] = np.maximum(values[:3], _LEAST_SHARE * mean[:3])
-        excess = max(0.0, self.axis.static_friction - self.axis.coulomb_friction)
-        return replace(
-            self.axis,
-            **dict(zip(_NAMES, values.tolist(), strict=True)),
-            static_friction=float(values[2]) + excess if excess else 0.0,
+        if not self.explanations:
+            mean = np.array([getattr(self.axis, name) for name in _NAMES])
+            values = random.multivariate_normal(mean, self.covariance, method="svd")
+            return _with_values(self.axis, values), self.ripple
+        weights = np.array([found.weight for found in self.explanations])
+        found = self.explanations[random.choice(len(weights), p=weights / weights.sum())]
+        values = random.multivariate_normal(found.values, found.covariance, method="svd")
+        return _explained(self.axis, replace(found, values=values))
+
+
+def _with_values(axis: Axis, values: FloatArray) -> Axis:
+    least = [_LEAST_SHARE * getattr(axis, name) for name in _NAMES[:3]]
+    values = np.concatenate([np.maximum(values[:3], least), values[3:]])
+    excess = max(0.0, axis.static_friction - axis.coulomb_friction)
+    return replace(
+        axis,
+        **dict(zip(_NAMES, values.tolist(), strict=True)),
+        static_friction=float(values[2]) + excess if excess else 0.0,
+    )
+
+
+def _explained(axis: Axis, found: Explanation) -> tuple[Axis, RippleForce]:
+    """`axis` with the values of `found`."""
+    axis = replace(axis, static_friction=0.0, stribeck_speed_m_s=0.0)
+    axis = _with_values(axis, found.values[: len(_NAMES)])
+    excess, speed_m_s = found.value("excess"), found.value("stribeck_speed_m_s")
+    if excess > 0 and speed_m_s > 0:
+        axis = replace(
+            axis,
+            static_friction=axis.coulomb_friction + excess,
+            stribeck_speed_m_s=speed_m_s,
+            stribeck_power=found.shape.stribeck_power,
         )
+    pitch_m = found.value("pitch_m")
+    if not pitch_m:
+        return axis, RippleForce()
+    return axis, RippleForce(found.value("ripple_sine"), found.value("ripple_cosine"), pitch_m)
 
 
 def replay_plant(axis: Axis, period_s: float) -> Plant:
@@ -64,7 +115,22 @@ def identify_model(record: AxisRecord, live: LiveController | None) -> AxisModel
         delay_periods=found.delay_periods,
         unit=record.drive.unit or "command unit",
     )
-    return AxisModel(with_stribeck(record, axis), found.fit.covariance / scale**2, found.method)
+    covariance = found.fit.covariance / scale**2
+    finer = _finer_model(record, axis, covariance)
+    return finer or AxisModel(with_stribeck(record, axis), covariance, found.method)
+
+
+def _finer_model(record: AxisRecord, axis: Axis, covariance: FloatArray) -> AxisModel | None:
+    """The model from windows of positions, if they resolve the acceleration."""
+    windows = motion_windows(record, axis.delay_periods, axis.viscous_friction / axis.inertia)
+    found = explain(windows, len(record), record.period_s)
+    if not found or found[0].noise_share > _LARGEST_NOISE_SHARE:
+        return None
+    if np.any(found[0].values[:3] <= 0):
+        return None
+    told, ripple = _explained(axis, found[0])
+    method = "force balance over windows of positions"
+    return AxisModel(told, covariance, method, ripple, windows, tuple(found))
 
 
 def _seen_saturation(record: AxisRecord) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 from seamlog.analysis.axis_record import AxisRecord
 from seamlog.analysis.identification.gated import USUAL_DELAY
@@ -10,7 +11,7 @@ from seamlog.contracts import Axis
 from seamlog.errors import EvidenceError
 from seamlog.progress import track
 
-from .counterfactual import Prediction, make_scene, predict
+from .counterfactual import Prediction, Scene, make_scene, predict
 from .factories import (
     ControllerChoice,
     EstimatorChoice,
@@ -77,6 +78,13 @@ class _Stage:
     mode: Mode
     settings: ReplaySettings
 
+    @cached_property
+    def scene(self) -> Scene | None:
+        """What a counterfactual keeps of the record; None without a model or in shadow mode."""
+        if self.model is None or self.mode == "shadow":
+            return None
+        return make_scene(self.record, self.model)
+
     def axis_for(self, choice: ControllerChoice) -> Axis:
         """The recorded controller keeps its nominal axis, others get the identified one."""
         if self.live and self._is_recorded(choice):
@@ -94,12 +102,10 @@ class _Stage:
         return self.live is not None and choice.name == self.live.name
 
     def prediction(self, choice: ControllerChoice) -> Prediction | None:
-        if self.model is None or self.mode == "shadow":
+        if self.scene is None:
             return None
-        axis, period_s = self.axis_for(choice), self.record.period_s
-        scene = make_scene(self.record, self.model)
-        settings = self.settings
-        return predict(lambda: choice.make(axis, period_s), scene, settings.members, settings.seed)
+        make = partial(choice.make, self.axis_for(choice), self.record.period_s)
+        return predict(make, self.scene, self.settings.members, self.settings.seed)
 
     def shadow(self, choice: ControllerChoice) -> ShadowOutput | None:
         if self.mode == "counterfactual":

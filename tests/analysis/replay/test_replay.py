@@ -120,8 +120,8 @@ def test_another_controller_is_predicted(loop: MakeLoop, seed: int) -> None:
         true_rms = rms_mm(truly.tracking_error_m(reference)[late])
         found = predict(partial(PD, config, truth, PERIOD_S), scene, 2, 0)
         misses.append(abs(rms_mm(found.error_m[late]) / true_rms - 1))
-    assert np.median(misses) < 0.06
-    assert max(misses) < 0.20
+    assert np.median(misses) < 0.03
+    assert max(misses) < 0.10
 
 
 def test_missing_messages_are_filled_and_told(loop: MakeLoop) -> None:
