@@ -3,10 +3,14 @@
 import importlib.util
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
 
 import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from tests.browsing import ARGUMENTS, Visitor
 
 PROJECT = Path(__file__).resolve().parent.parent
 REQUIRED = frozenset(filter(None, os.environ.get("SEAMLOG_REQUIRE", "").split(",")))
@@ -59,3 +63,18 @@ def node_modules() -> Path:
     if not folder.is_dir():
         missing("node", "no node_modules: `make test` installs it")
     return folder
+
+
+@pytest.fixture(scope="session")
+def _browser(chromium: str) -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visitor(_browser: Browser) -> Iterator[Visitor]:
+    visitor = Visitor(_browser)
+    yield visitor
+    visitor.close()

@@ -4,28 +4,16 @@ import json
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mcap.reader import make_reader
-from playwright.sync_api import Page, sync_playwright
 from rosbags.highlevel import AnyReader
 
 from seamlog import open_session
 from seamlog.results import Results
-
-CHROMIUM = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+from tests.browsing import Visitor
 
 
 @pytest.fixture(scope="module")
@@ -94,24 +82,11 @@ def test_every_part_is_there(demo: Path) -> None:
     assert {"health", "tracking", "identification", "replay", "bead", "join"} <= parts
 
 
-@pytest.fixture
-def page(chromium: str) -> Iterator[Page]:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=CHROMIUM)
-        yield browser.new_page(viewport={"width": 1280, "height": 900})
-        browser.close()
-
-
-def test_the_report_opens_from_disk_without_a_request(demo: Path, page: Page) -> None:
-    requests: list[str] = []
-    complaints: list[str] = []
-    report = (demo / "report.html").as_uri()
-    page.on("request", lambda request: requests.append(request.url))
-    page.on("console", lambda message: complaints.append(message.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.goto(report)
-    page.wait_for_selector(".uplot canvas")
-    assert [url for url in requests if url != report and not url.startswith("data:")] == []
-    assert complaints == []
-    text = page.inner_text("body")
-    assert "NOT ASSESSED" in text or "FAIL" in text or "PASS" in text
+def test_the_report_opens_from_disk_without_a_request(demo: Path, visitor: Visitor) -> None:
+    report = demo / "report.html"
+    visit = visitor.open(report)
+    visit.page.wait_for_selector(".uplot canvas")
+    assert [url for url in visit.requests if url != report.as_uri()] == []
+    assert visit.complaints == []
+    text = visit.page.inner_text("body")
+    assert "FAIL" in text and "weld speed" in text

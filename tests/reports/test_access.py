@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tests.reports.conftest import Visitor
+from tests.browsing import Visitor
 
 RUN = """async () => (await axe.run(document, {
     runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"],

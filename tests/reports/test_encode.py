@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as st_np
 from numpy.typing import NDArray
 
 from seamlog.reports.encode import decode, encode
-from tests.reports.conftest import Visitor
+from tests.browsing import Visitor
 
 Floats = NDArray[np.float64]
 columns = st_np.arrays(

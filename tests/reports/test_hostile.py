@@ -10,7 +10,7 @@ import pytest
 
 from seamlog.reports.report import Report
 from seamlog.results import Part, Results
-from tests.reports.conftest import Visitor
+from tests.browsing import Visitor
 from tests.reports.sample_results import write_sample
 
 ALERTS = (

@@ -8,7 +8,7 @@ from playwright.sync_api import Locator, Page
 
 from seamlog.reports.report import Report
 from seamlog.results import Results
-from tests.reports.conftest import Visitor
+from tests.browsing import Visitor
 from tests.reports.sample_results import OFFSET_MM, SLOW_S_MM, write_sample
 
 WIDTH = "#plot-0-bead-stations-width_mm"
