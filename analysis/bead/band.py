@@ -84,17 +84,17 @@ def edge_evidence(features: Floats, reach: int) -> Floats:
     return result
 
 
-def _contrast(features: Floats, centres: Floats, half: float) -> Floats:
+def _contrast(sums: _Sums, centres: Floats, half: float) -> Floats:
     """Fisher contrast of a band against both its sides as one (0 to 1), shape (rows, centres).
 
     Taking the sides together keeps a shadow between bead and plate from looking like a band:
-    its sides differ from each other more than from it.
+    its sides differ from each other more than from it. A band with more texture than its sides
+    counts up to a quarter more.
     """
-    columns = features.shape[1]
+    columns = sums.first.shape[1] - 1
     left = np.rint(centres - half).astype(np.int64)
     right = np.rint(centres + half).astype(np.int64)
     reach = max(4, round(2.0 * half))
-    sums = _sums(features)
     inside, spread = sums.window(left, right)
     one, spread_one = sums.window(np.maximum(left - reach, 0), left)
     two, spread_two = sums.window(right, np.minimum(right + reach, columns))
@@ -105,76 +105,71 @@ def _contrast(features: Floats, centres: Floats, half: float) -> Floats:
     return _saturate(square, 2.0) * (1 + 0.25 * np.tanh(np.maximum(rougher, 0))).astype(np.float32)
 
 
-def _states(columns: int, narrowest: float, widest: float) -> tuple[Floats, Floats]:
-    count = max(4, int(np.ceil(np.log(widest / narrowest) / np.log(1.13))) + 1)
-    halves = np.geomspace(narrowest, widest, count).astype(np.float32) / 2
-    return np.arange(columns + 1, dtype=np.float32), np.asarray(halves, dtype=np.float32)
+class BandSearch:
+    """Evidence for all bands of `narrowest` to `widest` columns in one feature picture.
 
-
-def find_band(
-    features: Features,
-    narrowest: float,
-    widest: float,
-    weight: Floats | None = None,
-    slope: int = 1,
-) -> Band | None:
-    """The best band of `narrowest` to `widest` columns, or None without evidence for one.
-
-    `weight`, shape (columns + 1,) or (rows, columns + 1), multiplies the evidence by the band's
-    centre. `slope` is the number of columns the centre may move from one section to the next.
+    `slope` is the number of columns the centre may move from one section to the next.
     """
-    scaled = (features / robust_scale(features)).astype(np.float32)
-    centres, halves = _states(features.shape[1], narrowest, widest)
-    score = _score(scaled, centres, halves)
-    if weight is not None:
-        score = score * (weight if weight.ndim == 2 else weight[None])[:, :, None]
-    return _trace(score, centres, halves, slope)
 
+    def __init__(self, features: Features, narrowest: float, widest: float, slope: int = 1) -> None:
+        self.rows, self.columns = features.shape[:2]
+        self._slope = slope
+        count = max(4, int(np.ceil(np.log(widest / narrowest) / np.log(1.13))) + 1)
+        self._halves = (np.geomspace(narrowest, widest, count) / 2).astype(np.float32)
+        self._centres = np.arange(self.columns + 1, dtype=np.float32)
+        self._evidence = self._score((features / robust_scale(features)).astype(np.float32))
 
-def _score(features: Floats, centres: Floats, halves: Floats) -> Floats:
-    """Evidence per section, centre and half width, shape (rows, centres, halves)."""
-    rows, columns = features.shape[:2]
-    edges = np.maximum(edge_evidence(features, 2), edge_evidence(features, 4))
-    near = edges.copy()
-    near[:, 1:] = np.maximum(near[:, 1:], edges[:, :-1])
-    near[:, :-1] = np.maximum(near[:, :-1], edges[:, 1:])
-    score = np.zeros((rows, len(centres), len(halves)), dtype=np.float32)
-    for k, half in enumerate(halves):
-        left = np.rint(centres - half).astype(np.int64)
-        right = np.rint(centres + half).astype(np.int64)
-        whole = np.flatnonzero((left >= 1) & (right <= columns - 1))
-        if not len(whole):
-            continue
-        pair = np.sqrt(near[:, left[whole]] * near[:, right[whole]])
-        inside = _contrast(features, centres[whole], float(half))
-        score[:, whole, k] = inside * np.sqrt(pair) * (2 * half / columns) ** _BROAD
-    return score
+    def best(self, allowed: Floats | None = None, widest: float = np.inf) -> Band | None:
+        """The band with the most evidence, or None without any.
 
+        `allowed`, shape (columns + 1,) or (rows, columns + 1), multiplies the evidence by the
+        band's centre; `widest` leaves broader ones out.
+        """
+        keep = 2 * self._halves <= max(widest, 2 * self._halves[0])
+        score = self._evidence[:, :, keep]
+        if allowed is not None:
+            score = score * (allowed if allowed.ndim == 2 else allowed[None])[:, :, None]
+        return _trace(score, self._centres, self._halves[keep], self._slope)
 
-def _shifted(values: Floats, step: int, axis: int) -> Floats:
-    result = np.full_like(values, -np.inf)
-    source, target = [slice(None)] * 2, [slice(None)] * 2
-    source[axis] = slice(max(0, -step), values.shape[axis] - max(0, step))
-    target[axis] = slice(max(0, step), values.shape[axis] + min(0, step))
-    result[tuple(target)] = values[tuple(source)]
-    return result
+    def _score(self, features: Floats) -> Floats:
+        """Evidence per section, centre and half width, shape (rows, centres, halves)."""
+        edges = np.maximum(edge_evidence(features, 2), edge_evidence(features, 4))
+        near = edges.copy()
+        near[:, 1:] = np.maximum(near[:, 1:], edges[:, :-1])
+        near[:, :-1] = np.maximum(near[:, :-1], edges[:, 1:])
+        sums = _sums(features)
+        shape = (len(features), len(self._centres), len(self._halves))
+        score = np.zeros(shape, dtype=np.float32)
+        for k, half in enumerate(self._halves):
+            left = np.rint(self._centres - half).astype(np.int64)
+            right = np.rint(self._centres + half).astype(np.int64)
+            whole = np.flatnonzero((left >= 1) & (right <= self.columns - 1))
+            if len(whole):
+                pair = np.sqrt(near[:, left[whole]] * near[:, right[whole]])
+                inside = _contrast(sums, self._centres[whole], float(half))
+                broad = (2 * half / self.columns) ** _BROAD
+                score[:, whole, k] = inside * np.sqrt(pair) * broad
+        return score
 
 
 def _trace(score: Floats, centres: Floats, halves: Floats, slope: int) -> Band | None:
+    """Dynamic programming over the sections with free start and stop."""
     moves = [(dc, dh) for dc in range(-slope, slope + 1) for dh in (-1, 0, 1)]
-    rows = score.shape[0]
-    value = np.zeros(score.shape[1:], dtype=np.float32)
+    rows, wide, high = score.shape
+    padded = np.full((wide + 2 * slope, high + 2), -np.inf, dtype=np.float32)
+    value = np.zeros((wide, high), dtype=np.float32)
     came = np.full(score.shape, -1, dtype=np.int8)
     totals = np.empty(rows, dtype=np.float64)
     ends = np.empty(rows, dtype=np.int64)
     for row in range(rows):
+        padded[slope : slope + wide, 1 : 1 + high] = value
         best = np.zeros_like(value)
         for index, (dc, dh) in enumerate(moves):
-            cost = _MOVE_COST * abs(dc) + _WIDEN_COST * abs(dh)
-            other = _shifted(_shifted(value, dc, 0), dh, 1) - cost
-            better = other > best
-            best[better], came[row][better] = other[better], index
-        value = best + score[row] - _EVIDENT
+            cost = np.float32(_MOVE_COST * abs(dc) + _WIDEN_COST * abs(dh))
+            other = padded[slope - dc : slope - dc + wide, 1 - dh : 1 - dh + high] - cost
+            came[row][other > best] = index
+            np.maximum(best, other, out=best)
+        value = best + score[row] - np.float32(_EVIDENT)
         ends[row] = int(np.argmax(value))
         totals[row] = value.flat[ends[row]]
     last = int(np.argmax(totals))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError
 
-from .band import Band, find_band
+from .band import Band, BandSearch
 from .features import Features, reduced_features, smoothed
 from .image import Photo
 from .plane import Points
@@ -42,62 +42,58 @@ def find_paths(photo: Photo) -> list[CoarsePath]:
     without any band.
     """
     features, factor = reduced_features(photo, _LONGEST_PX)
-    found = [_found(features, vertical) for vertical in (False, True)]
-    bands = [(band, vertical) for vertical, band in zip((False, True), found, strict=True) if band]
-    if not bands:
+    searches = [_search(features, vertical) for vertical in (False, True)]
+    bands = [search.best() for search in searches]
+    band, vertical = max(
+        ((band, bool(turn)) for turn, band in enumerate(bands) if band),
+        key=lambda pair: pair[0].total,
+        default=(None, False),
+    )
+    if band is None:
         raise EvidenceError(
             f"{photo.name}: no band differs from both its sides, so no bead can be told from the "
             "plate; take the photo from above with even light, or give the path by --session"
         )
-    band, vertical = max(bands, key=lambda pair: pair[0].total)
-    sections = _sections(features, vertical)
-    beside, inside = _beside(sections, band), _inside(sections, band)
-    outer = _in_photo(band, vertical, factor, _relative(beside, band), _relative(inside, band))
-    if inside is None or outer.inner < _NESTED:
+    search = searches[vertical]
+    inside = _inside(search, band)
+    rival, inner = _relative(_beside(search, band), band), _relative(inside, band)
+    outer = _in_photo(band, vertical, factor, rival, inner)
+    if inside is None or inner < _NESTED:
         return [outer]
-    deeper = _relative(_inside(sections, inside), inside)
-    return [outer, _in_photo(inside, vertical, factor, outer.rival, deeper)]
+    deeper = _relative(_inside(search, inside), inside)
+    return [outer, _in_photo(inside, vertical, factor, rival, deeper)]
 
 
-def _sections(features: Features, vertical: bool) -> Features:
-    """Rows that cross the bead: along it smoothed over, and reduced to every `_ALONG`-th."""
+def _search(features: Features, vertical: bool) -> BandSearch:
+    """Sections that cross the bead: smoothed along it, and every `_ALONG`-th of them."""
     turned = features if vertical else np.swapaxes(features, 0, 1)
-    turned = np.ascontiguousarray(turned)
-    return smoothed(turned, 0, 2.0)[_ALONG // 2 :: _ALONG]
-
-
-def _found(
-    features: Features, vertical: bool, weight: NDArray[np.float32] | None = None
-) -> Band | None:
-    sections = _sections(features, vertical)
-    widest = 0.6 * sections.shape[1]
-    return find_band(sections, 3.0, widest, weight, slope=_ALONG)
+    sections = smoothed(np.ascontiguousarray(turned), 0, 2.0)[_ALONG // 2 :: _ALONG]
+    return BandSearch(sections, 3.0, 0.6 * sections.shape[1], slope=_ALONG)
 
 
 def _relative(other: Band | None, band: Band) -> float:
     return other.total / band.total if other else 0.0
 
 
-def _away(sections: Features, band: Band) -> NDArray[np.float64]:
+def _away(search: BandSearch, band: Band) -> NDArray[np.float64]:
     """Distance of each column edge from the band's middle, in half widths, by row of the band."""
-    columns = np.arange(sections.shape[1] + 1)
+    columns = np.arange(search.columns + 1)
     distance = np.abs(columns - (band.right + band.left)[:, None] / 2)
     return np.asarray(distance / ((band.right - band.left)[:, None] / 2))
 
 
-def _beside(sections: Features, band: Band) -> Band | None:
+def _beside(search: BandSearch, band: Band) -> Band | None:
     """The best band with its middle outside `band` and its margin."""
-    allowed = np.ones((len(sections), sections.shape[1] + 1), dtype=np.float32)
-    allowed[band.first : band.last + 1][_away(sections, band) < 1.6] = 0
-    return find_band(sections, 3.0, 0.6 * sections.shape[1], allowed, slope=_ALONG)
+    allowed = np.ones((search.rows, search.columns + 1), dtype=np.float32)
+    allowed[band.first : band.last + 1][_away(search, band) < 1.6] = 0
+    return search.best(allowed)
 
 
-def _inside(sections: Features, band: Band) -> Band | None:
+def _inside(search: BandSearch, band: Band) -> Band | None:
     """The best band of at most two thirds of the width near the middle of `band`."""
-    allowed = np.zeros((len(sections), sections.shape[1] + 1), dtype=np.float32)
-    allowed[band.first : band.last + 1][_away(sections, band) < 0.4] = 1
-    narrower = max(4.0, 0.65 * float(np.median(band.right - band.left)))
-    return find_band(sections, 3.0, narrower, allowed, slope=_ALONG)
+    allowed = np.zeros((search.rows, search.columns + 1), dtype=np.float32)
+    allowed[band.first : band.last + 1][_away(search, band) < 0.4] = 1
+    return search.best(allowed, max(4.0, 0.65 * float(np.median(band.right - band.left))))
 
 
 def _in_photo(band: Band, vertical: bool, factor: float, rival: float, inner: float) -> CoarsePath:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError, ImageError
 
-from .band import find_band
+from .band import BandSearch
 from .chain import best_chain
 from .curve import arc_length, fit_centreline
 from .edge_model import EdgePlaces, locate_edges
@@ -133,7 +133,7 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     features = stack_texture(strip.opponent, 1.5)
     nearness = np.exp(-0.5 * (strip.offsets / (0.4 * reach)) ** 2).astype(np.float32)
     weight = np.append(nearness, nearness[-1:])
-    band = find_band(_blocks(features), 3.0, 0.7 * features.shape[1], weight)
+    band = BandSearch(_blocks(features), 3.0, 0.7 * features.shape[1]).best(weight)
     if band is None:
         raise EvidenceError(
             f"{photo.name}: no bead can be told from the plate along the given path; check that "
