@@ -24,6 +24,8 @@ _LEAST_GAIN = 0.03
 """Share of the remaining squares that a further effect must explain, for n rows of its own."""
 _NARROW_PITCH_M = 5e-4
 _LAGS = 20
+_ALIKE = 100
+"""Rows whose misfit resembles each other, when friction laws are compared: few reversals decide."""
 _LEAST_WEIGHT = 0.05
 _BASE = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 
@@ -146,7 +148,7 @@ def _with_stribeck(windows: Windows, shape: Shape, drift: FloatArray) -> list[tu
         tried = Shape(float(np.exp(found.x)), power, shape.pitch_m)
         fits.append((float(found.fun), tried))
     least = min(fits, key=lambda fit: fit[0])[0]
-    independent = len(windows.rows) / _LAGS
+    independent = len(windows.rows) / _ALIKE
     likely = [
         (shape, float((least / left) ** (independent / 2) * np.exp(-_freedom(shape))))
         for left, shape in fits

@@ -16,6 +16,8 @@ from seamlog.errors import EvidenceError
 
 MOST_FILLED = 0.05
 """Largest share of rows that may be filled."""
+LONGEST_HOLE_S = 2.0
+"""Longest hole that may be filled."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class ReplayInputs:
 
     record: AxisRecord
     notes: tuple[str, ...]
+    filled: NDArray[np.bool_]
+    """Rows that were made up, shape (n,)."""
 
 
 def replay_inputs(record: AxisRecord) -> ReplayInputs:
@@ -35,14 +39,16 @@ def replay_inputs(record: AxisRecord) -> ReplayInputs:
             "was to follow; record or import the reference"
         )
     record = _without_ends(record)
+    repeats = int(np.sum(np.diff(record.stamp_ns) <= 0))
+    if repeats:
+        notes.append(f"{repeats} rows whose stamp repeats or goes back were left out")
     record, filled = _filled(record)
-    if filled > MOST_FILLED * len(record):
-        raise EvidenceError(
-            f"{filled} of {len(record)} control periods are missing in the session, more than "
-            f"{100 * MOST_FILLED:.0f} %: a replay over them would be invented"
+    _require_small_holes(record, filled)
+    if filled.any():
+        notes.append(
+            f"{int(filled.sum())} missing control periods were filled by interpolation; no figure "
+            "is judged over them"
         )
-    if filled:
-        notes.append(f"{filled} missing control periods were filled by interpolation")
     period_s = record.period_s
     if not record.has_velocity:
         record = replace(record, velocity_m_s=_backward(record.position_m, period_s))
@@ -53,7 +59,24 @@ def replay_inputs(record: AxisRecord) -> ReplayInputs:
     if not np.isfinite(record.reference_m_s2).any():
         record = replace(record, reference_m_s2=np.gradient(record.reference_m_s, period_s))
         notes.append("reference acceleration was not recorded: derived from the reference")
-    return ReplayInputs(record, tuple(notes))
+    return ReplayInputs(record, tuple(notes), filled)
+
+
+def _require_small_holes(record: AxisRecord, filled: NDArray[np.bool_]) -> None:
+    count = int(filled.sum())
+    if count > MOST_FILLED * len(record):
+        raise EvidenceError(
+            f"{count} of {len(record)} control periods are missing in the session, more than "
+            f"{100 * MOST_FILLED:.0f} %: a replay over them would be invented"
+        )
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], filled.astype(np.int8), [0]])))
+    for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        hole_s = (end - start) * record.period_s
+        if hole_s > LONGEST_HOLE_S:
+            raise EvidenceError(
+                f"a hole of {hole_s:.3g} s at log time {record.log_time_ns[start]} ns is longer "
+                f"than {LONGEST_HOLE_S:g} s: a replay over it would be invented"
+            )
 
 
 def _without_ends(record: AxisRecord) -> AxisRecord:
@@ -69,8 +92,8 @@ def _without_ends(record: AxisRecord) -> AxisRecord:
     return record.rows(slice(int(rows[0]), int(rows[-1]) + 1))
 
 
-def _filled(record: AxisRecord) -> tuple[AxisRecord, int]:
-    """Columns with finite values on an even grid, and how many rows had to be made up."""
+def _filled(record: AxisRecord) -> tuple[AxisRecord, NDArray[np.bool_]]:
+    """Columns with finite values on an even grid, and which rows had to be made up."""
     period_ns = record.period_s * 1e9
     step = np.rint(np.diff(record.stamp_ns) / period_ns).astype(np.int64)
     place = np.concatenate([[0], np.cumsum(np.maximum(step, 0))])
@@ -88,8 +111,8 @@ def _filled(record: AxisRecord) -> tuple[AxisRecord, int]:
             columns[item.name], bad = _column(column[first], place[first], grid, hold)
             missing |= bad
     if not missing.any() and gaps == 0 and first.all():
-        return record, 0
-    return replace(record, **columns), int(missing.sum())
+        return record, missing
+    return replace(record, **columns), missing
 
 
 def _column(

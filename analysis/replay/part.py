@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 
 from seamlog.analysis.axis_record import AxisRecord
 from seamlog.analysis.part_tables import Tables
-from seamlog.results import Finding, Input, Part, Severity
+from seamlog.results import Finding, Input, Part, Severity, worst
 from seamlog.welds import Weld
 
+from .check_original import OriginalCheck
+from .check_part import check_criteria, check_findings
 from .figures import model_misses, replay_figures
 from .run import Replay
 from .settings import ReplaySettings
@@ -17,26 +19,42 @@ from .tables import replay_tables
 
 LARGE_MISS = 0.2
 """Relative miss of the recorded run from which on the part warns."""
+MUCH_SATURATED = 0.2
+"""Share of saturated commands from which on the part warns."""
 TOLERANCE = 1e-9
 """Largest difference of commands, relative to the largest command, that counts as reproduced."""
 
 
 def replay_part(
-    found: Replay, settings: ReplaySettings, welds: list[Weld], inputs: list[Input]
+    found: Replay,
+    settings: ReplaySettings,
+    welds: list[Weld],
+    inputs: list[Input],
+    check: OriginalCheck | None = None,
 ) -> tuple[Part, Tables]:
-    """The part `replay` and its tables; errors are judged over the welds, if there are any."""
-    judged = judged_rows(found.record, welds)
+    """The part `replay` and its tables; errors are judged over the welds, if there are any.
+
+    With `check` the part is judged by it.
+    """
+    judged = judged_rows(found.record, welds) & ~found.inputs.filled
+    criteria = check_criteria(check) if check else []
     figures = replay_figures(found, judged)
     misses = model_misses(found, judged)
     where = "over the welds" if welds else "over the whole record"
     part = Part(
         part="replay",
         title="Replay",
+        verdict=worst([criterion.verdict for criterion in criteria]),
         reason=f"compares controllers, judges none; rms and peak are {where}",
+        criteria=criteria,
         inputs=inputs,
         configuration=settings.model_dump(mode="json"),
         figures=figures,
-        findings=[*_findings(found), *_model_findings(misses)],
+        findings=[
+            *(check_findings(check) if check else []),
+            *_findings(found),
+            *_model_findings(misses),
+        ],
         details=_details(found) | {"model_misses": misses, "members": settings.members},
     )
     return part, replay_tables(found)
@@ -61,6 +79,13 @@ def _findings(found: Replay) -> list[Finding]:
                 "recorded moments; it predicts no tracking error"
             )
             messages.append((Severity.INFO, text))
+    share = float(found.record.saturated.mean())
+    if share > MUCH_SATURATED:
+        text = (
+            f"{100 * share:.0f} % of the commands were at their limit: the record says little of "
+            "what the controllers ask for"
+        )
+        messages.append((Severity.WARNING, text))
     if found.model_reason:
         messages.append((Severity.WARNING, f"no counterfactual: {found.model_reason}"))
     messages += _self_check_messages(found)

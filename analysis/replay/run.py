@@ -1,14 +1,15 @@
 """One replay of a session: several controllers and estimators, shadow and counterfactual."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
+from seamlog import plugins
 from seamlog.analysis.axis_record import AxisRecord
 from seamlog.analysis.identification.gated import USUAL_DELAY
 from seamlog.analysis.live_controller import LiveController
 from seamlog.contracts import Axis
-from seamlog.errors import EvidenceError
+from seamlog.errors import ConfigError, EvidenceError, UsageError
 from seamlog.progress import track
 
 from .counterfactual import Prediction, Scene, make_scene, predict
@@ -149,6 +150,41 @@ def replay(
             for choice in watchers
         ),
     )
+
+
+def check_names(
+    controllers: Sequence[str], estimators: Sequence[str], settings: ReplaySettings
+) -> None:
+    """Find what is named and check its configuration, before anything is read.
+
+    Raises the fault, or one `ConfigError` with all of them.
+    """
+    acts: list[Callable[[], object]] = [
+        *(partial(_controller, name, None, settings) for name in controllers),
+        *(partial(choose_estimator, n, settings.estimators.get(n, {})) for n in estimators),
+        *(
+            partial(plugins.load, "seamlog.controllers", name)
+            for name in settings.controllers.keys() - set(map(controller_label, controllers))
+        ),
+        *(
+            partial(plugins.load, "seamlog.estimators", name)
+            for name in settings.estimators.keys() - set(estimators)
+        ),
+    ]
+    faults = [fault for fault in map(_fault_of, acts) if fault is not None]
+    if len(faults) == 1:
+        raise faults[0]
+    if faults:
+        told = "\n".join(str(fault) for fault in faults)
+        raise ConfigError(told, tuple(str(fault) for fault in faults))
+
+
+def _fault_of(act: Callable[[], object]) -> UsageError | None:
+    try:
+        act()
+    except UsageError as error:
+        return error
+    return None
 
 
 def _controller(
