@@ -1,12 +1,6 @@
 """The default estimator: exact sampled regression, gated near rest, recursive least squares.
 
-Over a period with constant command u and constant sign s of the speed,
-
-    a (v_k - v_k-1) + b (x_k - x_k-1) + C s T = u T
-
-holds exactly, whatever the period T. Where the speed changes sign or is small the whole row is
-zeroed. All columns then pass 1 / (1 - q z^-1), which turns the differenced speed noise back into
-nearly white noise, and feed recursive least squares with exponential forgetting and bounded gain
+The rows (see `rows`) feed recursive least squares with exponential forgetting and bounded gain
 (eq. 22, 23 in inverse form, stable for every initial gain).
 """
 
@@ -17,6 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from seamlog.analysis.deterministic import exponential
 
 from .gain import Vector, diagonal_gain, largest_eigenvalue, reduced, times
+from .innovations import Innovations
+from .rows import GatedRows
 
 
 class GatedRLSConfig(BaseModel):
@@ -50,12 +46,8 @@ class GatedRLS:
             config.initial_viscous_friction,
             config.initial_coulomb_friction,
         )
-        self._last: tuple[float, float] | None = None
-        self._regressor: Vector = (0.0, 0.0, 0.0)
-        self._impulse = 0.0
-        self._memory_s = 0.0
-        self._rows = 0
-        self._squares = self._products = self._last_error = 0.0
+        self._rows = GatedRows(config.gate_m_s, config.filter_pole, period_s)
+        self._innovations = Innovations()
 
     def update(self, position_m: float, velocity_m_s: float, applied_command: float) -> float:
         """Take one sample and the command that acted over the period before it.
@@ -63,40 +55,17 @@ class GatedRLS:
         Returns the error of the prediction (predicted - applied, command unit), averaged over
         the filter's memory; NaN while there is no usable row.
         """
-        last, self._last = self._last, (position_m, velocity_m_s)
-        if last is None:
-            return math.nan
-        usable = self._filter(last, position_m, velocity_m_s, applied_command)
-        w, p = self._regressor, self._estimate
-        error = w[0] * p[0] + w[1] * p[1] + w[2] * p[2] - self._impulse
+        usable = self._rows.push(position_m, velocity_m_s, applied_command)
+        error = self._rows.error(self._estimate)
         if usable:
             self._learn(error)
-        return error / self._memory_s if self._memory_s > 1e-9 * self._period_s else math.nan
-
-    def _filter(
-        self, last: tuple[float, float], position_m: float, velocity_m_s: float, command: float
-    ) -> bool:
-        pole, gate, period = self._config.filter_pole, self._config.gate_m_s, self._period_s
-        before_m, before_m_s = last
-        w = self._regressor
-        self._impulse *= pole
-        self._memory_s *= pole
-        low, high = min(before_m_s, velocity_m_s), max(before_m_s, velocity_m_s)
-        if not (low > gate or high < -gate):
-            self._regressor = (pole * w[0], pole * w[1], pole * w[2])
-            return False
-        self._impulse += command * period
-        self._memory_s += period
-        self._regressor = (
-            pole * w[0] + (velocity_m_s - before_m_s),
-            pole * w[1] + (position_m - before_m),
-            pole * w[2] + (period if low > 0.0 else -period),
-        )
-        return True
+        else:
+            self._innovations.end_block()
+        return self._rows.mean_error(error)
 
     def _learn(self, error: float) -> None:
         period = self._period_s
-        w, p = self._regressor, self._estimate
+        w, p = self._rows.regressor, self._estimate
         kept = exponential(-period * self._forgetting())
         step = times(self._gain, w)
         information = w[0] * step[0] + w[1] * step[1] + w[2] * step[2]
@@ -104,12 +73,8 @@ class GatedRLS:
         move = weight * error
         self._estimate = (p[0] - move * step[0], p[1] - move * step[1], p[2] - move * step[2])
         self._gain = reduced(self._gain, step, weight, 1.0 / kept)
-        if self._rows >= 3:
-            white = error * math.sqrt(weight * kept / period)
-            self._squares += white * white
-            self._products += white * self._last_error
-            self._last_error = white
-        self._rows += 1
+        white = error * math.sqrt(weight * kept / period)
+        self._innovations.add(w, period * white, kept)
 
     def _forgetting(self) -> float:
         """Eq. 23 with the 2-norm: lambda_0 (1 - |gain| / K_0), never below 0."""
@@ -124,14 +89,5 @@ class GatedRLS:
         return self._estimate
 
     def variances(self) -> tuple[float, float, float]:
-        """From the gain and the prediction errors so far; NaN before ten usable rows.
-
-        Each gap at rest leaves an error that fades with the filter, so neighbouring prediction
-        errors resemble each other; the variance grows by (1 + rho) / (1 - rho) for that.
-        """
-        if self._rows < 10:
-            return math.nan, math.nan, math.nan
-        alike = min(max(self._products / self._squares, 0.0), 0.99) if self._squares > 0 else 0.0
-        noise = self._squares / (self._rows - 3) * self._period_s * (1.0 + alike) / (1.0 - alike)
-        gain = self._gain
-        return noise * gain[0], noise * gain[3], noise * gain[5]
+        """From the gain and the prediction errors so far; NaN before four stretches of sliding."""
+        return self._innovations.variances(self._gain)
