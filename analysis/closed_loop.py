@@ -5,6 +5,8 @@ acts `axis.delay_periods` later, over the period [k + delay, k + delay + 1]; bef
 command arrives, `initial_command` acts.
 """
 
+from array import array
+from collections import deque
 from dataclasses import dataclass
 from math import floor
 
@@ -75,40 +77,48 @@ def simulate(
     plant = plant or make_plant(axis, period_s)
     step, output, state = plant.step, controller.output, controller.state
     limit = axis.saturation
-    asked_m = reference.position_m.tolist()
-    asked_m_s = reference.velocity_m_s.tolist()
-    asked_m_s2 = reference.acceleration_m_s2.tolist()
     noise_m, noise_m_s = _series(position_noise_m, count), _series(velocity_noise_m_s, count)
     load = _series(disturbance, count)
-    position = asked_m[0] if initial_position_m is None else initial_position_m
-    velocity = asked_m_s[0] if initial_velocity_m_s is None else initial_velocity_m_s
-    waiting = [initial_command] * axis.delay_periods
-    rows: list[tuple[float, float, float, float, float, float, float]] = []
-    states = []
-    for k in range(count):
-        seen_m = noise_m[k] + (
+    asked = (reference.position_m, reference.velocity_m_s, reference.acceleration_m_s2)
+    inputs = zip(*(row.tolist() for row in (*asked, noise_m, noise_m_s, load)), strict=True)
+    position = float(asked[0][0]) if initial_position_m is None else initial_position_m
+    velocity = float(asked[1][0]) if initial_velocity_m_s is None else initial_velocity_m_s
+    waiting = deque([initial_command] * axis.delay_periods)
+    send, arrive = waiting.append, waiting.popleft
+    rows: list[float] = []
+    states: list[float] = []
+    log, log_state = rows.extend, states.extend
+    for asked_m, asked_m_s, asked_m_s2, off_m, off_m_s, push in inputs:
+        seen_m = off_m + (
             floor(position / encoder_step_m + 0.5) * encoder_step_m if encoder_step_m else position
         )
-        seen_m_s = velocity + noise_m_s[k]
-        wanted = output(asked_m[k], asked_m_s[k], asked_m_s2[k], seen_m, seen_m_s)
-        command = limit if wanted > limit else -limit if wanted < -limit else wanted
-        waiting.append(command)
-        applied = waiting.pop(0)
-        rows.append((position, velocity, seen_m, seen_m_s, command, applied, wanted))
-        states.append(state())
-        position, velocity = step(position, velocity, applied, load[k])
-    columns = np.array(rows, dtype=np.float64).reshape(count, 7).T
+        wanted = output(asked_m, asked_m_s, asked_m_s2, seen_m, velocity + off_m_s)
+        log((position, velocity, wanted))
+        log_state(state())
+        send(limit if wanted > limit else -limit if wanted < -limit else wanted)
+        position, velocity = step(position, velocity, arrive(), push)
+    position_m, velocity_m_s, wanted_command = _table(rows, count).T
+    counted_m = position_m
+    if encoder_step_m:
+        counted_m = np.floor(position_m / encoder_step_m + 0.5) * encoder_step_m
+    command = np.clip(wanted_command, -limit, limit)
+    early = np.full(min(axis.delay_periods, count), initial_command)
     return ClosedLoop(
-        position_m=columns[0],
-        velocity_m_s=columns[1],
-        measured_position_m=columns[2],
-        measured_velocity_m_s=columns[3],
-        command=columns[4],
-        applied_command=columns[5],
-        saturated=np.abs(columns[6]) > limit,
-        states=np.array(states, dtype=np.float64).reshape(count, -1),
+        position_m=position_m,
+        velocity_m_s=velocity_m_s,
+        measured_position_m=counted_m + noise_m,
+        measured_velocity_m_s=velocity_m_s + noise_m_s,
+        command=command,
+        applied_command=np.concatenate([early, command])[:count],
+        saturated=np.abs(wanted_command) > limit,
+        states=_table(states, count),
     )
 
 
-def _series(values: ArrayLike, count: int) -> list[float]:
-    return list(np.broadcast_to(np.asarray(values, dtype=np.float64), (count,)).tolist())
+def _series(values: ArrayLike, count: int) -> Floats:
+    return np.broadcast_to(np.asarray(values, dtype=np.float64), (count,))
+
+
+def _table(values: list[float], rows: int) -> Floats:
+    """Numbers one after the other as a table; `array` takes a list faster than numpy does."""
+    return np.array(array("d", values)).reshape(rows, len(values) // max(rows, 1))

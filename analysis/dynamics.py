@@ -7,7 +7,7 @@ and disturbances are in the axis' command unit, positions in m, velocities in m/
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from seamlog.contracts import Axis
@@ -42,51 +42,66 @@ class CoulombPlant:
     """
 
     def __init__(self, axis: Axis, period_s: float) -> None:
-        self._inertia, self._viscous = axis.inertia, axis.viscous_friction
-        self._coulomb, self._offset = axis.coulomb_friction, axis.offset
-        self._static = max(axis.static_friction, axis.coulomb_friction)
+        self._inertia, self._offset = axis.inertia, axis.offset
         self._period_s = period_s
-        exponent = axis.viscous_friction * period_s / axis.inertia
-        self._decay = exponential(-exponent)
-        self._travel = period_s * _mean_decay(exponent)
-        self._speed_gain = self._travel / axis.inertia
-        self._travel_gain = period_s * period_s * _mean_travel(exponent) / axis.inertia
+        forward, backward = axis, backward_axis(axis)
+        self._viscous = (forward.viscous_friction, backward.viscous_friction)
+        self._coulomb = (forward.coulomb_friction, -backward.coulomb_friction)
+        self._static = tuple(
+            max(a.static_friction, a.coulomb_friction) for a in (forward, backward)
+        )
+        self._forward = (*held_motion(forward, period_s), self._coulomb[0])
+        self._backward = (*held_motion(backward, period_s), self._coulomb[1])
 
     def step(
         self, position_m: float, velocity_m_s: float, command: float, disturbance: float = 0.0
     ) -> tuple[float, float]:
         """Position and velocity one period later, exact to rounding."""
         force = command - self._offset - disturbance
-        if velocity_m_s == 0.0:
-            if -self._static <= force <= self._static:
-                return position_m, 0.0
-            net = force - self._coulomb if force > 0.0 else force + self._coulomb
-            return position_m + self._travel_gain * net, self._speed_gain * net
-        net = force - self._coulomb if velocity_m_s > 0.0 else force + self._coulomb
-        end_m_s = self._decay * velocity_m_s + self._speed_gain * net
-        if end_m_s * velocity_m_s < 0.0:
-            return self._step_through_rest(position_m, velocity_m_s, force, net)
-        position_m += self._travel * velocity_m_s + self._travel_gain * net
-        return position_m, end_m_s
+        if velocity_m_s > 0.0:
+            decay, travel, speed_gain, travel_gain, friction = self._forward
+        elif velocity_m_s < 0.0:
+            decay, travel, speed_gain, travel_gain, friction = self._backward
+        else:
+            return self._step_from_rest(position_m, force)
+        net = force - friction
+        end_m_s = decay * velocity_m_s + speed_gain * net
+        if (end_m_s < 0.0) if velocity_m_s > 0.0 else (end_m_s > 0.0):
+            return self._step_through_rest(position_m, velocity_m_s, force)
+        return position_m + travel * velocity_m_s + travel_gain * net, end_m_s
+
+    def _holds(self, force: float) -> bool:
+        return -self._static[1] <= force <= self._static[0]
+
+    def _step_from_rest(self, position_m: float, force: float) -> tuple[float, float]:
+        if self._holds(force):
+            return position_m, 0.0
+        _, _, speed_gain, travel_gain, friction = self._forward if force > 0.0 else self._backward
+        net = force - friction
+        return position_m + travel_gain * net, speed_gain * net
 
     def _step_through_rest(
-        self, position_m: float, velocity_m_s: float, force: float, net: float
+        self, position_m: float, velocity_m_s: float, force: float
     ) -> tuple[float, float]:
-        pull = net - self._viscous * velocity_m_s
-        share = self._viscous * velocity_m_s / pull
+        side = 0 if velocity_m_s > 0.0 else 1
+        viscous = self._viscous[side]
+        pull = force - self._coulomb[side] - viscous * velocity_m_s
+        share = viscous * velocity_m_s / pull
         stop_s = -velocity_m_s * self._inertia / pull * _log_slope(share)
         stop_s = min(max(stop_s, 0.0), self._period_s)
-        position_m, _ = self._glide(position_m, velocity_m_s, pull, stop_s)
-        if -self._static <= force <= self._static:
+        position_m, _ = self._glide(position_m, velocity_m_s, pull, stop_s, viscous)
+        if self._holds(force):
             return position_m, 0.0
-        pull = force - self._coulomb if force > 0.0 else force + self._coulomb
-        return self._glide(position_m, 0.0, pull, self._period_s - stop_s)
+        side = 0 if force > 0.0 else 1
+        rest_s = self._period_s - stop_s
+        pull = force - self._coulomb[side]
+        return self._glide(position_m, 0.0, pull, rest_s, self._viscous[side])
 
     def _glide(
-        self, position_m: float, velocity_m_s: float, pull: float, time_s: float
+        self, position_m: float, velocity_m_s: float, pull: float, time_s: float, viscous: float
     ) -> tuple[float, float]:
         """`pull` is inertia times the acceleration at the start."""
-        exponent = self._viscous * time_s / self._inertia
+        exponent = viscous * time_s / self._inertia
         start_m_s2 = pull / self._inertia
         position_m += velocity_m_s * time_s
         position_m += start_m_s2 * time_s * time_s * _mean_travel(exponent)
@@ -103,7 +118,7 @@ class StribeckPlant:
     def __init__(
         self, axis: Axis, period_s: float, substeps: int = 0, ripple: Ripple | None = None
     ) -> None:
-        self._axis = axis
+        self._forward, self._backward = axis, backward_axis(axis)
         self._substeps = substeps or max(1, round(period_s / 1e-3))
         self._step_s = period_s / self._substeps
         self._ripple = ripple
@@ -112,17 +127,17 @@ class StribeckPlant:
         self, position_m: float, velocity_m_s: float, command: float, disturbance: float = 0.0
     ) -> tuple[float, float]:
         """Position and velocity one period later; error of the order of the sub-step."""
-        axis, step_s = self._axis, self._step_s
-        gain = step_s / axis.inertia
-        damping = 1.0 + gain * axis.viscous_friction
-        force = command - axis.offset - disturbance
+        forward, step_s = self._forward, self._step_s
+        gain = step_s / forward.inertia
+        force = command - forward.offset - disturbance
         for _ in range(self._substeps):
             impulse = velocity_m_s + gain * (force - self._ripple_force(position_m))
+            axis = forward if impulse > 0.0 else self._backward
             hold = gain * sliding_friction(axis, abs(velocity_m_s))
             if impulse > hold:
-                next_m_s = (impulse - hold) / damping
+                next_m_s = (impulse - hold) / (1.0 + gain * axis.viscous_friction)
             elif impulse < -hold:
-                next_m_s = (impulse + hold) / damping
+                next_m_s = (impulse + hold) / (1.0 + gain * axis.viscous_friction)
             else:
                 next_m_s = 0.0
             position_m += 0.5 * step_s * (velocity_m_s + next_m_s)
@@ -140,6 +155,30 @@ def make_plant(axis: Axis, period_s: float) -> CoulombPlant | StribeckPlant:
     if axis.stribeck_speed_m_s > 0.0 and axis.static_friction > axis.coulomb_friction:
         return StribeckPlant(axis, period_s)
     return CoulombPlant(axis, period_s)
+
+
+def backward_axis(axis: Axis) -> Axis:
+    """`axis` with the friction of motion towards negative positions as its only friction."""
+    viscous, coulomb = axis.viscous_friction_negative, axis.coulomb_friction_negative
+    return replace(
+        axis,
+        viscous_friction=axis.viscous_friction if viscous is None else viscous,
+        coulomb_friction=axis.coulomb_friction if coulomb is None else coulomb,
+        viscous_friction_negative=None,
+        coulomb_friction_negative=None,
+    )
+
+
+def held_motion(axis: Axis, period_s: float) -> tuple[float, float, float, float]:
+    """Exact motion of inertia and viscous friction over a period of constant net force.
+
+    (decay, travel, speed_gain, travel_gain): the speed becomes decay v + speed_gain force, the
+    position moves by travel v + travel_gain force.
+    """
+    exponent = axis.viscous_friction * period_s / axis.inertia
+    travel = period_s * _mean_decay(exponent)
+    travel_gain = period_s * period_s * _mean_travel(exponent) / axis.inertia
+    return exponential(-exponent), travel, travel / axis.inertia, travel_gain
 
 
 def axis_from_datasheet(

@@ -7,17 +7,29 @@ from seamlog.contracts import Axis
 from .deterministic import arctangent, exponential, log_one_plus
 
 _TWO_OVER_PI = 0.6366197723675814
+_THIRD = 0.3333333333333333
 
 
-def friction_shape(velocity_m_s: float, dead_zone_m_s: float) -> float:
-    """Eq. 3 without C and b: (2/pi) atan((v/alpha)^9), dimensionless, in (-1, 1)."""
+def friction_shape(velocity_m_s: float, dead_zone_m_s: float, power: int = 9) -> float:
+    """Eq. 3 without C and b: (2/pi) atan((v/alpha)^power), dimensionless, in (-1, 1).
+
+    `power` is odd. Far outside the dead zone the series of the arctangent at infinity is exact.
+    """
     ratio = velocity_m_s / dead_zone_m_s
-    if ratio > 100.0:
-        return 1.0
-    if ratio < -100.0:
-        return -1.0
-    cube = ratio * ratio * ratio
-    return _TWO_OVER_PI * arctangent(cube * cube * cube)
+    if power == 9:
+        cube = ratio * ratio * ratio
+        raised = cube * cube * cube
+    else:
+        raised = ratio
+        for _ in range(power // 2):
+            raised *= ratio * ratio
+    if raised > 1e4:
+        rest = 1.0 / raised
+        return 1.0 - _TWO_OVER_PI * (rest - rest * rest * rest * _THIRD)
+    if raised < -1e4:
+        rest = 1.0 / raised
+        return -1.0 - _TWO_OVER_PI * (rest - rest * rest * rest * _THIRD)
+    return _TWO_OVER_PI * arctangent(raised)
 
 
 def arctangent_sign(velocity: float) -> float:

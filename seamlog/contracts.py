@@ -19,7 +19,8 @@ class Axis:
 
     inertia [unit s^2/m], viscous_friction [unit s/m], coulomb_friction [unit], offset [unit],
     static_friction [unit] and stribeck_speed_m_s (0: no Stribeck), saturation [unit] (inf: none),
-    delay_periods: whole control periods between a command and its effect.
+    delay_periods: whole control periods between a command and its effect. The `_negative` pair is
+    for motion towards negative positions; None: as for positive ones.
     """
 
     inertia: float
@@ -32,6 +33,8 @@ class Axis:
     saturation: float = float("inf")
     delay_periods: int = 1
     unit: str = "N"
+    viscous_friction_negative: float | None = None
+    coulomb_friction_negative: float | None = None
 
 
 class Controller(Protocol):

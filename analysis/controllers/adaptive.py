@@ -2,10 +2,11 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from seamlog.analysis.estimators.gated_rls import GatedRLS, GatedRLSConfig
 from seamlog.contracts import Axis
 
+from .inner import InnerEstimator
 from .paper import PaperConfig, PaperController
+from .sent import SentCommands
 
 
 class AdaptiveConfig(BaseModel):
@@ -14,7 +15,7 @@ class AdaptiveConfig(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     law: PaperConfig = PaperConfig()
-    estimator: GatedRLSConfig = GatedRLSConfig()
+    estimator: InnerEstimator = InnerEstimator(name="gated_rls")
     adapt_after_s: float = Field(5.0, ge=0)
     """Until then the law keeps the axis' nominal parameters."""
 
@@ -32,10 +33,9 @@ class AdaptiveController:
 
     def __init__(self, config: AdaptiveConfig, axis: Axis, period_s: float) -> None:
         self.law = PaperController(config.law, axis, period_s)
-        self.estimator = GatedRLS(config.estimator, period_s)
+        self.estimator = config.estimator.make(period_s)
         self.prediction_error = float("nan")
-        self._limit = axis.saturation
-        self._waiting = [0.0] * (axis.delay_periods + 1)
+        self._sent = SentCommands(axis)
         self._quiet_periods = round(config.adapt_after_s / period_s)
 
     def output(
@@ -47,7 +47,7 @@ class AdaptiveController:
         velocity_m_s: float,
     ) -> float:
         """Update the estimator with this sample, the law with the estimate, then the law."""
-        applied = self._waiting.pop(0)
+        applied = self._sent.arrive()
         self.prediction_error = self.estimator.update(position_m, velocity_m_s, applied)
         if self._quiet_periods > 0:
             self._quiet_periods -= 1
@@ -56,7 +56,7 @@ class AdaptiveController:
         wanted = self.law.output(
             reference_m, reference_m_s, reference_m_s2, position_m, velocity_m_s
         )
-        self._waiting.append(min(max(wanted, -self._limit), self._limit))
+        self._sent.send(wanted)
         return wanted
 
     def _adapt(self) -> None:

@@ -1,9 +1,11 @@
-"""Proportional-derivative control, the baseline, with optional feed-forward of the reference."""
+"""Proportional-derivative control, the baseline; with feed-forward it is computed torque."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from seamlog.analysis.friction import friction_shape
 from seamlog.contracts import Axis
+
+from .feed_forward import DeadZone, feed_forward
+from .stability import loop_radius, unstable_warning
 
 
 class PDConfig(BaseModel):
@@ -17,8 +19,7 @@ class PDConfig(BaseModel):
     """Command unit s/m; None: 8 1/s times the inertia (critical damping with the default kp)."""
     feed_forward: bool = False
     """Add what the axis' model needs along the reference."""
-    dead_zone_m_s: float = Field(0.0005, gt=0)
-    """alpha of the friction shape, taken at the reference speed; for the feed-forward only."""
+    dead_zone_m_s: float = DeadZone
 
 
 class PD:
@@ -49,28 +50,20 @@ class PD:
         """Command before saturation."""
         error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
         feedback = self._kp * error_m + self._kd * error_m_s
-        feed_forward = self._feed_forward(reference_m_s, reference_m_s2)
-        self._state = (error_m, error_m_s, feedback, feed_forward)
-        return feedback + feed_forward
+        known = self._feed_forward(reference_m_s, reference_m_s2)
+        self._state = (error_m, error_m_s, feedback, known)
+        return feedback + known
 
     def _feed_forward(self, reference_m_s: float, reference_m_s2: float) -> float:
         if not self._config.feed_forward:
             return 0.0
-        axis = self._axis
-        friction = axis.coulomb_friction * friction_shape(reference_m_s, self._config.dead_zone_m_s)
-        return axis.inertia * reference_m_s2 + axis.viscous_friction * reference_m_s + friction
+        return feed_forward(self._axis, self._config.dead_zone_m_s, reference_m_s, reference_m_s2)
 
     def state(self) -> tuple[float, ...]:
         """Values in the order of `state_names`."""
         return self._state
 
     def warnings(self) -> list[str]:
-        """Limits that these gains break on this axis (linear loop with its delay)."""
-        lag_s = self._period_s * (0.5 + self._axis.delay_periods)
-        rate = self._kd / self._axis.inertia * lag_s
-        if rate < 1.0:
-            return []
-        return [
-            f"kd x lag / inertia = {rate:.3g} is not below 1: with half a period and "
-            f"{self._axis.delay_periods} of delay the loop is unstable or close to it"
-        ]
+        """Whether these gains make the linear loop unstable."""
+        radius = loop_radius(self._axis, self._period_s, self._kp, self._kd)
+        return unstable_warning(radius, f"kp {self._kp:.4g} with kd {self._kd:.4g}", self._axis)

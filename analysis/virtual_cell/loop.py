@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.analysis.controllers.adaptive import AdaptiveConfig, AdaptiveController
+from seamlog.analysis.controllers.inner import InnerEstimator
 from seamlog.analysis.controllers.paper import PaperConfig
-from seamlog.analysis.estimators.gated_rls import GatedRLSConfig
 
 from .path_fit import SeamPath
 from .rig import NOMINAL_AXIS, PERIOD_S
@@ -28,10 +28,13 @@ CONTROLLER = AdaptiveConfig(
         dead_zone_m_s=0.0001,
         friction_speed="reference",
     ),
-    estimator=GatedRLSConfig(
-        initial_inertia=NOMINAL_AXIS.inertia,
-        initial_viscous_friction=NOMINAL_AXIS.viscous_friction,
-        initial_coulomb_friction=NOMINAL_AXIS.coulomb_friction,
+    estimator=InnerEstimator(
+        name="gated_rls",
+        config={
+            "initial_inertia": NOMINAL_AXIS.inertia,
+            "initial_viscous_friction": NOMINAL_AXIS.viscous_friction,
+            "initial_coulomb_friction": NOMINAL_AXIS.coulomb_friction,
+        },
     ),
     adapt_after_s=5.0,
 )

@@ -9,7 +9,7 @@ from seamlog.analysis.closed_loop import Reference, simulate
 from seamlog.analysis.controllers.adaptive import AdaptiveConfig, AdaptiveController
 from seamlog.analysis.controllers.paper import PaperConfig, PaperController
 from seamlog.analysis.controllers.pd import PD, PDConfig
-from seamlog.analysis.estimators.gated_rls import GatedRLS
+from seamlog.analysis.estimators.gated_rls import GatedRLS, GatedRLSConfig
 from seamlog.contracts import Axis
 
 from .axis_bench import AXIS, ENCODER_STEP_M, PERIOD_S, sine, speed_noise
@@ -161,7 +161,7 @@ def test_adaptive_estimator_sees_the_command_that_acted() -> None:
     controller = AdaptiveController(AdaptiveConfig(), tight, PERIOD_S)
     run = simulate(controller, tight, sine(0.1, 1.0), PERIOD_S, velocity_noise_m_s=speed_noise(5))
     assert run.saturated.any()
-    alone = GatedRLS(AdaptiveConfig().estimator, PERIOD_S)
+    alone = GatedRLS(GatedRLSConfig(), PERIOD_S)
     before = [0.0, *run.applied_command[:-1]]
     for seen in zip(run.measured_position_m, run.measured_velocity_m_s, before, strict=True):
         alone.update(*seen)

@@ -1,0 +1,18 @@
+"""What the axis' model needs along the reference: computed torque, shared by several laws."""
+
+from pydantic import Field
+
+from seamlog.analysis.friction import friction_shape
+from seamlog.contracts import Axis
+
+DeadZone = Field(0.0005, gt=0)
+"""alpha of the friction shape at the reference speed, m/s; small, as that speed has no noise."""
+
+
+def feed_forward(
+    axis: Axis, dead_zone_m_s: float, reference_m_s: float, reference_m_s2: float
+) -> float:
+    """Command a a_d + b v_d + C s(v_d), with the offset of the axis."""
+    friction = axis.coulomb_friction * friction_shape(reference_m_s, dead_zone_m_s)
+    moved = axis.inertia * reference_m_s2 + axis.viscous_friction * reference_m_s
+    return moved + friction + axis.offset
