@@ -17,6 +17,8 @@ from .model import RippleForce
 
 Floats = NDArray[np.float64]
 SUBSTEP_S = 0.005
+FAR_M = 1e3
+"""A loop that gets this far has run away; it is kept there, so that numbers stay finite."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,8 @@ def simulate_worlds(
         positions[k] = position
         log.take(k, (position, velocity, seen_m, seen_m_s, command, applied, wanted))
         position, velocity = axes.step(position, velocity, applied, load[k])
+        position = np.minimum(np.maximum(position, -FAR_M), FAR_M)
+        velocity = np.minimum(np.maximum(velocity, -FAR_M), FAR_M)
     return Runs(positions.T, log.runs(limit))
 
 

@@ -12,7 +12,7 @@ from seamlog.welds import Weld
 
 from .check_original import OriginalCheck
 from .check_part import check_criteria, check_findings
-from .figures import model_misses, replay_figures
+from .figures import UNSTABLE, model_misses, replay_figures
 from .run import Replay
 from .settings import ReplaySettings
 from .tables import replay_tables
@@ -72,6 +72,8 @@ def _findings(found: Replay) -> list[Finding]:
     messages = [(Severity.INFO, note) for note in found.inputs.notes]
     for run in found.controllers:
         messages += [(Severity.WARNING, f"{run.choice.name}: {text}") for text in run.warnings]
+        if run.prediction is not None and not run.prediction.is_bounded:
+            messages.append((Severity.WARNING, f"{run.choice.name}: {UNSTABLE}"))
         recorded = found.live is not None and found.live.name == run.choice.name
         if run.shadow is not None and not recorded:
             text = (
