@@ -40,69 +40,81 @@ class Band:
     total: float
 
 
-@dataclass(frozen=True, slots=True)
 class _Sums:
-    """Running sums along each section, so that any window's mean is two look-ups."""
+    """Running sums along each section, so that any window's mean is a difference of two slices.
 
-    first: Floats
-    second: Floats
+    Kept as (features, rows, columns), padded so that windows may reach over the borders.
+    """
 
-    def window(self, start: NDArray[np.int64], stop: NDArray[np.int64]) -> tuple[Floats, Floats]:
-        """Mean and variance per feature of columns [start, stop), shape (rows, windows, k)."""
-        count = np.maximum(stop - start, 1)[None, :, None].astype(np.float32)
-        mean = (self.first[:, stop] - self.first[:, start]) / count
-        square = (self.second[:, stop] - self.second[:, start]) / count
+    def __init__(self, features: Floats) -> None:
+        self.columns = features.shape[1]
+        planes = np.ascontiguousarray(np.moveaxis(features, 2, 0))
+        self._first, self._second = self._running(planes), self._running(planes * planes)
+
+    def _running(self, planes: Floats) -> Floats:
+        total = np.cumsum(planes, axis=2, dtype=np.float64).astype(np.float32)
+        pads = ((0, 0), (0, 0), (self.columns + 1, self.columns))
+        return np.pad(np.pad(total, (*pads[:2], (0, 0))), pads, mode="edge") * self._known(pads)
+
+    def _known(self, pads: tuple[tuple[int, int], ...]) -> Floats:
+        """0 left of the first column, where an edge pad would repeat its sum, else 1."""
+        known = np.ones(self.columns + sum(pads[2]), dtype=np.float32)
+        known[: pads[2][0]] = 0
+        return known
+
+    def window(self, centres: range, start: int, stop: int) -> tuple[Floats, Floats]:
+        """Mean and variance of columns [c + start, c + stop) for each c, (features, rows, c)."""
+        at = np.arange(centres.start, centres.stop)
+        inside = np.clip(at + stop, 0, self.columns) - np.clip(at + start, 0, self.columns)
+        count = np.maximum(inside, 1).astype(np.float32)
+        mean = self._between(self._first, centres, start, stop) / count
+        square = self._between(self._second, centres, start, stop) / count
         return mean, np.maximum(square - mean * mean, 0)
 
-
-def _sums(features: Floats) -> _Sums:
-    def running(values: Floats) -> Floats:
-        zero = np.zeros((values.shape[0], 1, values.shape[2]), dtype=np.float32)
-        total = np.cumsum(values, axis=1, dtype=np.float64).astype(np.float32)
-        return np.concatenate([zero, total], axis=1)
-
-    return _Sums(running(features), running(features * features))
+    def _between(self, sums: Floats, centres: range, start: int, stop: int) -> Floats:
+        first, last = centres.start + self.columns, centres.stop + self.columns
+        return np.asarray(
+            sums[..., first + stop : last + stop] - sums[..., first + start : last + start]
+        )
 
 
 def _saturate(square: Floats, half_at: float) -> Floats:
     return square / (square + np.float32(half_at))
 
 
-def edge_evidence(features: Floats, reach: int) -> Floats:
+def edge_evidence(features: Features, reach: int) -> Floats:
     """How sharply the features change at each column edge (0 to 1), shape (rows, columns + 1).
 
     The change between the two windows of `reach` columns on both sides, against their spread.
     """
-    columns = features.shape[1]
-    at = np.arange(reach, columns - reach + 1)
-    sums = _sums(features)
-    mean_a, var_a = sums.window(at - reach, at)
-    mean_b, var_b = sums.window(at, at + reach)
-    square = ((mean_a - mean_b) ** 2 / (0.5 * (var_a + var_b) + _FLOOR)).sum(axis=2)
-    result = np.zeros((features.shape[0], columns + 1), dtype=np.float32)
-    result[:, at] = _saturate(square, 1.5)
+    return _edges(_Sums(features), features.shape[0], reach)
+
+
+def _edges(sums: _Sums, rows: int, reach: int) -> Floats:
+    at = range(reach, sums.columns - reach + 1)
+    mean_a, var_a = sums.window(at, -reach, 0)
+    mean_b, var_b = sums.window(at, 0, reach)
+    square = ((mean_a - mean_b) ** 2 / (0.5 * (var_a + var_b) + _FLOOR)).sum(axis=0)
+    result = np.zeros((rows, sums.columns + 1), dtype=np.float32)
+    result[:, at.start : at.stop] = _saturate(square, 1.5)
     return result
 
 
-def _contrast(sums: _Sums, centres: Floats, half: float) -> Floats:
+def _contrast(sums: _Sums, centres: range, half: int) -> Floats:
     """Fisher contrast of a band against both its sides as one (0 to 1), shape (rows, centres).
 
     Taking the sides together keeps a shadow between bead and plate from looking like a band:
     its sides differ from each other more than from it. A band with more texture than its sides
     counts up to a quarter more.
     """
-    columns = sums.first.shape[1] - 1
-    left = np.rint(centres - half).astype(np.int64)
-    right = np.rint(centres + half).astype(np.int64)
-    reach = max(4, round(2.0 * half))
-    inside, spread = sums.window(left, right)
-    one, spread_one = sums.window(np.maximum(left - reach, 0), left)
-    two, spread_two = sums.window(right, np.minimum(right + reach, columns))
-    outside = (one + two) / 2
+    reach = max(4, 2 * half)
+    inside, spread = sums.window(centres, -half, half)
+    one, spread_one = sums.window(centres, -half - reach, -half)
+    two, spread_two = sums.window(centres, half, half + reach)
     apart = (spread_one + spread_two) / 2 + ((one - two) / 2) ** 2
-    square = ((inside - outside) ** 2 / (0.5 * (spread + apart) + _FLOOR)).sum(axis=2)
-    rougher = inside[..., -1] - np.maximum(one[..., -1], two[..., -1])
-    return _saturate(square, 2.0) * (1 + 0.25 * np.tanh(np.maximum(rougher, 0))).astype(np.float32)
+    square = (inside - (one + two) / 2) ** 2 / (0.5 * (spread + apart) + _FLOOR)
+    rougher = np.maximum(inside[-1] - np.maximum(one[-1], two[-1]), 0)
+    return np.asarray(_saturate(square.sum(axis=0), 2.0) * (1 + 0.25 * np.tanh(rougher)))
 
 
 class BandSearch:
@@ -131,24 +143,23 @@ class BandSearch:
             score = score * (allowed if allowed.ndim == 2 else allowed[None])[:, :, None]
         return _trace(score, self._centres, self._halves[keep], self._slope)
 
-    def _score(self, features: Floats) -> Floats:
+    def _score(self, features: Features) -> Floats:
         """Evidence per section, centre and half width, shape (rows, centres, halves)."""
-        edges = np.maximum(edge_evidence(features, 2), edge_evidence(features, 4))
+        rows, sums = len(features), _Sums(features)
+        edges = np.maximum(_edges(sums, rows, 2), _edges(sums, rows, 4))
         near = edges.copy()
         near[:, 1:] = np.maximum(near[:, 1:], edges[:, :-1])
         near[:, :-1] = np.maximum(near[:, :-1], edges[:, 1:])
-        sums = _sums(features)
-        shape = (len(features), len(self._centres), len(self._halves))
-        score = np.zeros(shape, dtype=np.float32)
-        for k, half in enumerate(self._halves):
-            left = np.rint(self._centres - half).astype(np.int64)
-            right = np.rint(self._centres + half).astype(np.int64)
-            whole = np.flatnonzero((left >= 1) & (right <= self.columns - 1))
+        score = np.zeros((rows, len(self._centres), len(self._halves)), dtype=np.float32)
+        for k, exact in enumerate(self._halves):
+            half = max(1, round(float(exact)))
+            whole = range(half + 1, self.columns - half)
             if len(whole):
-                pair = np.sqrt(near[:, left[whole]] * near[:, right[whole]])
-                inside = _contrast(sums, self._centres[whole], float(half))
-                broad = (2 * half / self.columns) ** _BROAD
-                score[:, whole, k] = inside * np.sqrt(pair) * broad
+                left = near[:, whole.start - half : whole.stop - half]
+                right = near[:, whole.start + half : whole.stop + half]
+                broad = np.float32((2 * float(exact) / self.columns) ** _BROAD)
+                sharp = np.sqrt(np.sqrt(left * right))
+                score[:, whole.start : whole.stop, k] = _contrast(sums, whole, half) * sharp * broad
         return score
 
 

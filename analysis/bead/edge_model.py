@@ -6,6 +6,7 @@ blurred step, ramps on both sides, a dark line outside); the shift that captures
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ _BLURS_PX = tuple(float(blur) for blur in np.geomspace(0.7, 4.6, 8))
 _MODELS = ("step", "line", "ramps", "ramps and line")
 _SHIFT = 0.125
 _RANGE = 2.5
+_SHIFTS = np.arange(-_RANGE, _RANGE + 1e-9, _SHIFT)
 _GREY_FLOOR = 0.03
 """Variance in grey levels that any picture has: rounding to 8 bit."""
 _PRICE = 0.1
@@ -84,11 +86,14 @@ def _lowest(misfits: Sequence[float]) -> float:
     at = int(np.clip(np.argmin(misfits), 1, len(misfits) - 2))
     a, b, c = misfits[at - 1 : at + 2]
     move = float(np.clip(0.5 * (a - c) / max(a - 2 * b + c, 1e-9), -1, 1))
-    return float(_BLURS_PX[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move)
+    return round(float(_BLURS_PX[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move), 2)
 
 
-def _half_window(blur: float) -> int:
-    return int(np.ceil(3.0 * blur + _RANGE)) + 2
+def _window() -> tuple[Floats, Floats]:
+    """Columns around an edge that are looked at, and their weights."""
+    half = int(np.ceil(3.0 * max(_BLURS_PX) + _RANGE)) + 2
+    at = np.arange(-half, half + 1, dtype=np.float64)
+    return at, np.exp(-0.5 * (at / (half / 2.0)) ** 2)
 
 
 def _basis(at: Floats, shift: float, model: str, blur: float) -> Floats:
@@ -107,31 +112,33 @@ def _basis(at: Floats, shift: float, model: str, blur: float) -> Floats:
 
 
 def _fit(signal: NDArray[np.float32], near: Floats, side: int, model: str, blur: float) -> _Fit:
-    half = _half_window(max(_BLURS_PX))
-    at = np.arange(-half, half + 1, dtype=np.float64)
+    at, weight = _window()
+    half = len(at) // 2
     centre = np.clip(np.rint(near).astype(int), half, signal.shape[1] - 1 - half)
     rows = np.arange(len(near))[:, None]
     profile = signal[rows, centre[:, None] - side * at.astype(int)].astype(np.float64)
-    weight = np.exp(-0.5 * (at / (half / 2.0)) ** 2)
     profile = (profile - profile.mean(axis=1, keepdims=True)) * weight
-    shifts = np.arange(-_RANGE, _RANGE + 1e-9, _SHIFT)
-    captured = np.stack(
-        [((profile @ _weighted(at, s, model, blur, weight)) ** 2).sum(axis=1) for s in shifts], 1
-    )
+    captured = np.stack([((profile @ q) ** 2).sum(axis=1) for q in _subspaces(model, blur)], axis=1)
     total = (profile**2).sum(axis=1)
-    peak = np.clip(np.argmax(captured, axis=1), 1, len(shifts) - 2)
+    peak = np.clip(np.argmax(captured, axis=1), 1, len(_SHIFTS) - 2)
     a, b, c = (captured[np.arange(len(peak)), peak + k] for k in (-1, 0, 1))
     curvature = np.minimum(a - 2 * b + c, -1e-9)
     move = np.clip(0.5 * (a - c) / curvature, -1, 1)
-    shift = shifts[peak] + move * _SHIFT
+    shift = _SHIFTS[peak] + move * _SHIFT
     residual = np.maximum(total - b, 1e-9)
     variance = 1 / (-0.5 * curvature / _SHIFT**2)
     freedom = float((weight**2).sum()) - _basis(at, 0.0, model, blur).shape[1] - 1
     return _Fit(centre - side * shift, residual, variance, max(1, int(freedom)))
 
 
-def _weighted(at: Floats, shift: float, model: str, blur: float, weight: Floats) -> Floats:
-    return np.asarray(np.linalg.qr(_basis(at, shift, model, blur) * weight[:, None])[0])
+@cache
+def _subspaces(model: str, blur: float) -> tuple[Floats, ...]:
+    """Orthonormal bases of the weighted profiles, one for each shift."""
+    at, weight = _window()
+    return tuple(
+        np.asarray(np.linalg.qr(_basis(at, shift, model, blur) * weight[:, None])[0])
+        for shift in _SHIFTS
+    )
 
 
 def _height(signal: NDArray[np.float32], column: Floats, side: int, blur: float) -> Floats:

@@ -85,7 +85,7 @@ def _most_trusted(
 def _measure(photo: Photo, plane: Plane, found: _Path, start: str | None) -> BeadMeasurement:
     unit = plane.unit_per_px(plane.to_px(found.points))
     _refuse_narrow(photo, 2 * found.half / unit)
-    path, half = found.points, found.half
+    path, half = _extended(photo, plane, found.points, found.half), found.half
     strip, extent = _straighten(photo, plane, path, half, unit, freedom=0.45)
     for freedom in (0.35, 0.25):
         path = _recentred(strip, extent)
@@ -96,6 +96,31 @@ def _measure(photo: Photo, plane: Plane, found: _Path, start: str | None) -> Bea
     fine = _sampled(photo, plane, path, half, unit, row_step, unit)
     toes = _refine(fine, _carried(strip, extent, fine), unit)
     return assemble(photo, plane, fine, toes, rows_per_station, found.band, start)
+
+
+def _extended(photo: Photo, plane: Plane, path: Points, half: float) -> Points:
+    """The path with two half widths more at both ends, as far as the photo goes.
+
+    Only past its end can be seen that a bead ends.
+    """
+    beyond = np.arange(0.5, 2.01, 0.5)[:, None] * half
+    before = path[0] + beyond * _heading(path[::-1], 3 * half)
+    after = path[-1] + beyond * _heading(path, 3 * half)
+    before, after = (more[_in_photo(photo, plane.to_px(more))] for more in (before, after))
+    return np.concatenate([before[::-1], path, after])
+
+
+def _heading(path: Points, over: float) -> Points:
+    """Unit direction of travel at the last point, taken over the last `over`."""
+    length = arc_length(path)
+    back = min(int(np.searchsorted(length, length[-1] - over)), len(path) - 2)
+    away = path[-1] - path[back]
+    return np.asarray(away / max(float(np.hypot(*away)), 1e-9))
+
+
+def _in_photo(photo: Photo, px: Points) -> NDArray[np.bool_]:
+    inside = (px >= 0).all(axis=1) & (px <= (photo.width_px - 1, photo.height_px - 1)).all(axis=1)
+    return np.asarray(inside)
 
 
 def _refuse_narrow(photo: Photo, width_px: float) -> None:
@@ -151,8 +176,7 @@ def _blocks(features: Features) -> Features:
 
 
 def _inside_photo(photo: Photo, plane: Plane, prior: Points) -> Points:
-    px = plane.to_px(prior)
-    inside = (px >= 0).all(axis=1) & (px <= (photo.width_px - 1, photo.height_px - 1)).all(axis=1)
+    inside = _in_photo(photo, plane.to_px(prior))
     if inside.sum() < 2:
         raise EvidenceError(
             f"{photo.name}: the given path does not run through the photo; check the calibration"
@@ -259,7 +283,7 @@ def _sharpest(signal: NDArray[np.float32], edge: Floats, side: int, reach: float
     fall = -side * np.gradient(smooth, axis=1)
     away = side * (np.arange(signal.shape[1]) - edge[:, None])
     typical = np.percentile(np.where(np.abs(away) <= reach, fall, 0).max(axis=1), 50) + 1e-6
-    score = np.clip(fall / typical, 0, 1.5) * (1 + 0.05 * away / reach)
+    score = np.clip(fall / typical, 0, 1.5) * (1 + 0.2 * away / reach)
     score = np.where(np.abs(away) <= reach, score, -1e6).astype(np.float32)
     return best_chain(score, 0.1).astype(np.float64)
 
