@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "attach": ("seamlog.commands.attach:attach", "Put photos, procedures, calibrations in."),
     "identify": ("seamlog.analysis.commands.identify:identify", "Find inertia and friction."),
     "replay": ("seamlog.analysis.commands.replay:replay", "Run logged inputs through code again."),
+    "sweep": ("seamlog.analysis.commands.sweep:sweep", "Rank many tunings of controllers."),
     "bead": ("seamlog.analysis.commands.bead:bead", "Measure the bead on photos."),
     "analyze": ("seamlog.analysis.commands.analyze:analyze", "Session and photos to results."),
     "report": ("seamlog.reports.commands:report", "Results to one HTML file."),

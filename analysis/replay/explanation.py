@@ -4,15 +4,12 @@ Linear in all but the Stribeck speed and the pitch of the ripple, which are sear
 friction and ripple are taken in only where they explain what nothing else does.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import optimize
 
 from seamlog.analysis.axis_record import FloatArray
-from seamlog.analysis.identification.regression import correlated_least_squares, scaled
-from seamlog.errors import EvidenceError
 
 from .windows import Windows
 
@@ -20,6 +17,7 @@ STRIBECK_SPEEDS_M_S = (0.0005, 0.001, 0.002, 0.004, 0.008, 0.016)
 _DRIFT_HZ = 0.1
 _FEWEST_ROWS = 100
 _LARGEST_CONDITION = 300.0
+_SINGULAR_CONDITION = 1e4
 _LEAST_GAIN = 0.03
 """Share of the remaining squares that a further effect must explain, for n rows of its own."""
 _NARROW_PITCH_M = 5e-4
@@ -27,6 +25,7 @@ _LAGS = 20
 _ALIKE = 100
 """Rows whose misfit resembles each other, when friction laws are compared: few reversals decide."""
 _LEAST_WEIGHT = 0.05
+_DRIFT = "drift"
 _BASE = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 
 
@@ -70,7 +69,7 @@ def explain(windows: Windows, duration_rows: int, period_s: float) -> list[Expla
         return []
     drift = _drift(windows, duration_rows, period_s)
     plain = Shape()
-    if np.linalg.cond(scaled(_columns(windows, plain, drift))) > _LARGEST_CONDITION:
+    if _condition(_columns(windows, plain, drift)) > _LARGEST_CONDITION:
         return []
     shape = _with_ripple(windows, plain, drift)
     likely = _with_stribeck(windows, shape, drift)
@@ -120,17 +119,13 @@ def _with_ripple(windows: Windows, shape: Shape, drift: FloatArray) -> Shape:
     best = float(waves[int(np.argmax(power))])
 
     def squares(wave: float) -> float:
-        return _squares(windows, _pitched(shape, 1 / wave), drift)
+        return _squares(windows, replace(shape, pitch_m=1 / wave), drift)
 
     near = 0.2 / travel
     found = optimize.minimize_scalar(squares, bounds=(best - near, best + near), method="bounded")
     if found.fun > (1 - _LEAST_GAIN) * float(left @ left):
         return shape
-    return _pitched(shape, 1 / float(found.x))
-
-
-def _pitched(shape: Shape, pitch_m: float) -> Shape:
-    return Shape(shape.stribeck_speed_m_s, shape.stribeck_power, pitch_m)
+    return replace(shape, pitch_m=1 / float(found.x))
 
 
 def _with_stribeck(windows: Windows, shape: Shape, drift: FloatArray) -> list[tuple[Shape, float]]:
@@ -172,42 +167,53 @@ def _finished(
     """
     columns = _columns(windows, shape, drift)
     linear = np.linalg.lstsq(columns, windows.force, rcond=None)[0]
-    bent, values = [], []
-    for name, changed in _neighbours(shape):
-        step, other = changed
-        slope = (_columns(windows, other, drift) - columns) @ linear / step
-        bent.append((name, slope))
-        values.append(getattr(shape, name))
-    names = (*shape.names, *(f"drift_{i}" for i in range(drift.shape[1])), *(n for n, _ in bent))
-    jacobian = np.column_stack([columns, *(slope for _, slope in bent)])
+    bent = _neighbours(shape)
+    slopes = [
+        (_columns(windows, other, drift) - columns) @ linear / step for _, step, other in bent
+    ]
+    names = (*shape.names, *[_DRIFT] * drift.shape[1], *(name for name, _, _ in bent))
+    jacobian = np.column_stack([columns, *slopes])
     left = windows.force - columns @ linear
-    try:
-        fit = correlated_least_squares(names, jacobian, left, _LAGS)
-    except EvidenceError:
+    if _condition(jacobian) > _SINGULAR_CONDITION:
         return None
-    kept = [i for i, name in enumerate(names) if not name.startswith("drift_")]
-    whole = np.concatenate([linear, values]) + fit.values
+    kept = [i for i, name in enumerate(names) if name != _DRIFT]
+    values = np.concatenate([linear, [getattr(shape, name) for name, _, _ in bent]])
+    whole = values + np.linalg.lstsq(jacobian, left, rcond=None)[0]
     inertia = linear[0] * windows.acceleration_m_s2
     return Explanation(
         shape=shape,
         names=tuple(names[i] for i in kept),
         values=whole[kept],
-        covariance=fit.covariance[np.ix_(kept, kept)],
+        covariance=_covariance(jacobian, left)[np.ix_(kept, kept)],
         noise_share=float(left @ left / (inertia @ inertia)),
         weight=weight,
     )
 
 
-def _neighbours(shape: Shape) -> Sequence[tuple[str, tuple[float, Shape]]]:
-    """Steps of the nonlinear values for slopes by difference."""
-    found: list[tuple[str, tuple[float, Shape]]] = []
+def _condition(columns: FloatArray) -> float:
+    """Condition number with all columns scaled to length 1."""
+    return float(np.linalg.cond(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)))
+
+
+def _covariance(jacobian: FloatArray, left: FloatArray) -> FloatArray:
+    """For a residual correlated over _LAGS rows (Newey and West, Econometrica 55 (1987) 703)."""
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    scores = jacobian * left[:, None]
+    middle = scores.T @ scores
+    for lag in range(1, _LAGS + 1):
+        lagged = scores[lag:].T @ scores[:-lag]
+        middle += (1 - lag / (_LAGS + 1)) * (lagged + lagged.T)
+    return np.asarray(inverse @ middle @ inverse)
+
+
+def _neighbours(shape: Shape) -> list[tuple[str, float, Shape]]:
+    """Name, step and stepped shape of each nonlinear value, for slopes by difference."""
+    found: list[tuple[str, float, Shape]] = []
     speed, pitch = shape.stribeck_speed_m_s, shape.pitch_m
     if speed:
         step = 1e-3 * speed
-        found.append(
-            ("stribeck_speed_m_s", (step, Shape(speed + step, shape.stribeck_power, pitch)))
-        )
+        found.append(("stribeck_speed_m_s", step, replace(shape, stribeck_speed_m_s=speed + step)))
     if pitch:
         step = 1e-5 * pitch
-        found.append(("pitch_m", (step, _pitched(shape, pitch + step))))
+        found.append(("pitch_m", step, replace(shape, pitch_m=pitch + step)))
     return found

@@ -58,17 +58,20 @@ def unexplained_misses(found: Replay, judged: NDArray[np.bool_]) -> dict[str, fl
 
     It goes into the uncertainty of the cases whose answer is not known.
     """
-    misses, own = model_misses(found, judged), found.recorded
-    if misses is None or own is None:
+    if found.recorded is None:
         return None
-    spreads = {
-        kind: own.spread(judge, judged) / own.best(judge, judged) for kind, judge in JUDGES.items()
+    measured, own = found.record.error_m[judged], found.recorded
+    return {
+        kind: unexplained_miss(judge(measured), own.judged(judge, judged))
+        for kind, judge in JUDGES.items()
     }
-    return {kind: _beyond(misses[kind], spreads[kind]) for kind in JUDGES}
 
 
-def _beyond(whole: float, part: float) -> float:
-    return float(np.sqrt(max(0.0, whole**2 - part**2)))
+def unexplained_miss(measured: float, predicted: FloatArray) -> float:
+    """Relative miss of the recorded run beyond the spread of its predictions (members,)."""
+    best = float(np.median(predicted))
+    miss, spread = best / measured - 1, float(np.std(predicted, ddof=1)) / best
+    return float(np.sqrt(max(0.0, miss**2 - spread**2)))
 
 
 def _recorded_figures(found: Replay, judged: NDArray[np.bool_]) -> list[Figure]:

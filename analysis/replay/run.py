@@ -69,6 +69,22 @@ class Replay:
         return self.inputs.record
 
 
+def controller_axis(
+    choice: ControllerChoice, live: LiveController | None, model: AxisModel | None
+) -> Axis:
+    """The recorded controller keeps its nominal axis, others get the identified one."""
+    if live and choice.name == live.name:
+        return live.axis
+    if model:
+        return model.axis
+    if live:
+        return live.axis
+    raise EvidenceError(
+        "no axis is known: the session names none and none could be identified, so a controller "
+        "cannot be made; record a run that moves to and fro"
+    )
+
+
 @dataclass(frozen=True)
 class _Stage:
     """What all runs of one replay have in common."""
@@ -86,32 +102,18 @@ class _Stage:
             return None
         return make_scene(self.record, self.model)
 
-    def axis_for(self, choice: ControllerChoice) -> Axis:
-        """The recorded controller keeps its nominal axis, others get the identified one."""
-        if self.live and self._is_recorded(choice):
-            return self.live.axis
-        if self.model:
-            return self.model.axis
-        if self.live:
-            return self.live.axis
-        raise EvidenceError(
-            "no axis is known: the session names none and none could be identified, so a "
-            "controller cannot be made; record a run that moves to and fro"
-        )
-
-    def _is_recorded(self, choice: ControllerChoice) -> bool:
-        return self.live is not None and choice.name == self.live.name
-
     def prediction(self, choice: ControllerChoice) -> Prediction | None:
         if self.scene is None:
             return None
-        make = partial(choice.make, self.axis_for(choice), self.record.period_s)
+        make = partial(
+            choice.make, controller_axis(choice, self.live, self.model), self.record.period_s
+        )
         return predict(make, self.scene, self.settings.members, self.settings.seed)
 
     def shadow(self, choice: ControllerChoice) -> ShadowOutput | None:
         if self.mode == "counterfactual":
             return None
-        axis = self.axis_for(choice)
+        axis = controller_axis(choice, self.live, self.model)
         controller = choice.make(axis, self.record.period_s)
         return shadow_controller(controller, self.record, axis.saturation)
 
@@ -211,7 +213,9 @@ def _model(
 
 
 def _run(choice: ControllerChoice, stage: _Stage) -> ControllerRun:
-    controller = choice.make(stage.axis_for(choice), stage.record.period_s)
+    controller = choice.make(
+        controller_axis(choice, stage.live, stage.model), stage.record.period_s
+    )
     warnings = controller.warnings() if hasattr(controller, "warnings") else []
     return ControllerRun(
         choice=choice,
