@@ -16,6 +16,9 @@ from .evaluate import SessionFigures
 from .plan import Point
 from .settings import Kind
 
+FINEST_SHARE = 0.01
+"""Smaller relative differences are never told apart: the median miss of predictions of other
+controllers on the counterfactual benchmark is as large."""
 _NINETY = 1.645
 """Half width of a 90 % band in standard deviations."""
 
@@ -25,8 +28,8 @@ class Ranked:
     """One point: figure, its standard uncertainty and 90 % band, mm; NaN if a loop ran away.
 
     `u_mm` contains the model's miss of the recorded run. `behind_mm` and `u_behind_mm` are the
-    distance to the best; `told_apart` says whether that is more than the model's miss in 95 % of
-    the worlds.
+    distance to the best; `told_apart` says whether that is more than the model's miss (at least
+    FINEST_SHARE) in 95 % of the worlds.
     """
 
     point: Point
@@ -63,6 +66,7 @@ def _ranked(
     members_mm, best_mm, miss = judged
     low, high = np.quantile(members_mm, BAND, method="weibull")
     value, behind = float(np.median(members_mm)), members_mm - best_mm
+    resolution_mm = max(miss, FINEST_SHARE) * float(np.median(best_mm))
     least = float(np.quantile(behind, BAND[0], method="weibull"))
     return Ranked(
         point=point,
@@ -75,6 +79,6 @@ def _ranked(
         high_mm=value + float(np.hypot(high - value, _NINETY * miss * value)),
         behind_mm=float(np.median(behind)),
         u_behind_mm=float(np.std(behind, ddof=1)),
-        told_apart=bool(np.isnan(least) or least > miss * float(np.median(best_mm))),
+        told_apart=bool(np.isnan(least) or least > resolution_mm),
         warnings=sessions[0].judged[point.key].warnings,
     )
