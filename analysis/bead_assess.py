@@ -10,7 +10,7 @@ from seamlog.results import Input, Part, input_of
 from .bead.assess import AssessedPhoto, assess_photos
 from .bead.part import BeadConfig, Pictures, Tables
 from .bead.sources import attached_photos, photo_files
-from .join import join_part, no_join
+from .join_part import join_part, no_join
 
 if TYPE_CHECKING:
     from seamlog.session import Session

@@ -31,8 +31,6 @@ from .uniformity import Uniformity, uniformity
 Tables = Mapping[str, tuple[Columns, Mapping[str, str]]]
 Pictures = Mapping[str, tuple[bytes, Picture]]
 
-_CONFIDENT = 0.5
-
 
 class BeadConfig(BaseModel):
     """Section `bead` of the configuration: the detector, and the user's limits if any."""
@@ -140,7 +138,7 @@ def _picture(result: BeadResult) -> tuple[bytes, Picture]:
 def _figures(result: BeadResult) -> list[Figure]:
     m, even = result.measurement, result.uniformity
     unit = m.unit
-    why = "" if m.confidence >= _CONFIDENT else f"low confidence ({m.confidence:.2f})"
+    why = "" if m.trusted else f"low confidence ({m.confidence:.2f})"
     if even is None:
         reason = "fewer than three stations could be measured"
         return [Figure(name=f"width_mean_{unit}", label="Mean width", value=None, reason=reason)]

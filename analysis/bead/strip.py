@@ -3,25 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError, ImageError
 
 from .band import BandSearch
-from .chain import best_chain
 from .curve import arc_length, fit_centreline
-from .edge_model import EdgePlaces, locate_edges
 from .features import Features, smoothed, stack_texture, strip_features
 from .image import Photo
 from .measurement import BeadMeasurement
 from .path import find_paths
 from .plane import Plane, Points
+from .refine import refine_toes
 from .sampling import Strip, sample_strip
 from .toes import Extent, find_toes
-from .width import BandEvidence, Toes, assemble
-from .zones import fisher_direction, zone
+from .width import BandEvidence, assemble
 
 Floats = NDArray[np.float64]
 
@@ -32,9 +29,6 @@ _CLEAR = 0.5
 """Confidence from which on no other candidate is tried."""
 _COARSE = 40
 """Columns of half the bead in the strip that toes are traced in."""
-_ALONG_PX = 2.0
-_ALONG_WIDTHS = 0.03
-"""Gaussian averaging along the seam: this many px, or this part of the width if that is more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +88,7 @@ def _measure(photo: Photo, plane: Plane, found: _Path, start: str | None) -> Bea
         strip, extent = _straighten(photo, plane, path, half, unit, freedom)
     rows_per_station, row_step = _row_step(plane, unit)
     fine = _sampled(photo, plane, path, half, unit, row_step, unit)
-    toes = _refine(fine, _carried(strip, extent, fine), unit)
+    toes = refine_toes(fine, _carried(strip, extent, fine), unit)
     return assemble(photo, plane, fine, toes, rows_per_station, found.band, start)
 
 
@@ -206,8 +200,11 @@ def _straighten(
     features = strip_features(strip.opponent, max(1.5, 0.03 * half / step))
     middle = strip.column(np.zeros(len(strip.line.s)))
     rough = Extent(middle - half / step, middle + half / step, np.zeros(len(strip.line.s)))
-    first = find_toes(features, strip.valid, rough, freedom)
-    return strip, find_toes(features, strip.valid, _calmed(first), 0.6 * freedom)
+    try:
+        first = find_toes(features, strip.valid, rough, freedom)
+        return strip, find_toes(features, strip.valid, _calmed(first), 0.6 * freedom)
+    except EvidenceError as error:
+        raise EvidenceError(f"{photo.name}: {error}") from error
 
 
 def _sampled(
@@ -247,63 +244,3 @@ def _running_median(values: Floats, half: Floats) -> Floats:
     size = int(max(5, np.median(half)))
     calm = median_filter(values, 2 * (size // 2) + 1, mode="nearest")
     return np.asarray(gaussian_filter1d(calm, size / 4, mode="nearest"))
-
-
-def _refine(strip: Strip, extent: Extent, unit: float) -> tuple[Toes, Toes]:
-    """Sub-pixel toes of both sides, in offsets."""
-    width_px = 2 * float(np.median(extent.half))
-    row_px = float(strip.line.s[1] - strip.line.s[0]) / unit
-    along = max(_ALONG_PX, _ALONG_WIDTHS * width_px) / row_px
-    smooth = smoothed(strip.opponent, 0, along)
-    sides = []
-    for side, edge in ((-1, extent.left), (1, extent.right)):
-        signal, distance = _projection(smooth, strip.valid, edge, side, extent)
-        near = _sharpest(signal, edge, side, 3 + 0.06 * float(np.median(extent.half)))
-        places = locate_edges(signal, near, side)
-        sides.append(_toes(strip, places, extent, edge, side, distance))
-    return sides[0], sides[1]
-
-
-def _projection(
-    opponent: Features, valid: NDArray[np.bool_], edge: Floats, side: int, extent: Extent
-) -> tuple[NDArray[np.float32], float]:
-    """The one colour mixture that tells bead from plate best at this toe, shape (rows, columns)."""
-    depth = max(4.0, 0.25 * float(np.median(extent.half)))
-    columns = opponent.shape[1]
-    inner = (edge - depth, edge - 1) if side > 0 else (edge + 1, edge + depth)
-    outer = (edge + 1, edge + depth) if side > 0 else (edge - depth, edge - 1)
-    inside, outside = (zone(columns, *bounds, valid) for bounds in (inner, outer))
-    direction, distance = fisher_direction(opponent[inside], opponent[outside])
-    return (opponent @ direction.astype(np.float32)), distance
-
-
-def _sharpest(signal: NDArray[np.float32], edge: Floats, side: int, reach: float) -> Floats:
-    """Chain of the steepest falls from bead to plate within `reach` columns of `edge`."""
-    smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.5)
-    fall = -side * np.gradient(smooth, axis=1)
-    away = side * (np.arange(signal.shape[1]) - edge[:, None])
-    typical = np.percentile(np.where(np.abs(away) <= reach, fall, 0).max(axis=1), 50) + 1e-6
-    score = np.clip(fall / typical, 0, 1.5) * (1 + 0.2 * away / reach)
-    score = np.where(np.abs(away) <= reach, score, -1e6).astype(np.float32)
-    return best_chain(score, 0.1).astype(np.float64)
-
-
-def _toes(
-    strip: Strip, places: EdgePlaces, extent: Extent, edge: Floats, side: int, distance: float
-) -> Toes:
-    column = places.column
-    rows = np.arange(len(column))
-    reach = 3 + 2 * places.blur_px
-    outside = np.clip(np.rint(column + side * reach).astype(int), 0, strip.valid.shape[1] - 1)
-    return Toes(
-        offset=strip.offset(column),
-        u_noise=places.u * strip.step,
-        u_model=places.between_models * strip.step,
-        height=places.height,
-        in_frame=strip.valid[rows, outside],
-        present=extent.present,
-        disagreement=np.abs(column - edge) * strip.step,
-        distance=distance,
-        model=places.model,
-        blur_px=places.blur_px,
-    )

@@ -1,0 +1,1 @@
+"""Tests of the bead: photos, strip, toes, width, results."""

@@ -1,0 +1,80 @@
+"""`seamlog bead measure` as people and programs call it."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from seamlog.analysis.bead.synthetic import Scene, render
+from seamlog.cli import ExitCode, main
+from seamlog.results import Results
+
+
+def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    printed = capsys.readouterr()
+    return int(ended.value.code or 0), printed.out, printed.err
+
+
+@pytest.fixture
+def photo(tmp_path: Path) -> Path:
+    bead = render(Scene(width_px=512, height_px=300, noise=3), 1)
+    path = tmp_path / "weld.png"
+    cv2.imwrite(str(path), bead.pixels)
+    calibration = bead.calibration.model_dump_json(by_alias=True)
+    (tmp_path / "weld.calibration.json").write_text(calibration)
+    return path
+
+
+def test_json_and_results(photo: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = photo.parent / "r"
+    arguments = ["bead", "measure", str(photo), "--start", "left", "-o", str(output), "--json"]
+    code, out, _ = run(arguments, capsys)
+    document = json.loads(out)
+    assert code == ExitCode.PASS
+    assert document["schema"] == "seamlog.bead.measure"
+    figures = document["photos"][0]
+    assert figures["mean_width_mm"] == pytest.approx(6, abs=0.3)
+    wanted = {"width_std", "width_cv", "range", "peak_to_peak_25mm", "stations", "flagged"}
+    assert wanted | {"confidence", "verdict"} <= set(figures)
+    part = Results.open(output).parts()[0]
+    assert (part.part, part.pictures["overlay"].file) == ("bead", "bead.overlay.webp")
+    assert run(arguments, capsys)[0] == ExitCode.USAGE, "nothing is overwritten"
+    assert run([*arguments, "--force"], capsys)[0] == ExitCode.PASS
+
+
+def test_limits_from_the_configuration(photo: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["bead", "measure", str(photo), "--set"]
+    assert run([*arguments, "bead.max_width_mm=8"], capsys)[0] == ExitCode.PASS
+    code, out, _ = run([*arguments, "bead.max_width_mm=5"], capsys)
+    assert (code, "FAIL" in out) == (ExitCode.FINDING, True)
+    assert run([*arguments, "bead.max_widht_mm=5"], capsys)[0] == ExitCode.USAGE
+
+
+@pytest.mark.parametrize(
+    ("content", "code"),
+    [
+        (cv2.imencode(".png", np.full((200, 300), 90, np.uint8))[1].tobytes(), ExitCode.EVIDENCE),
+        (b"no picture", ExitCode.INPUT),
+        (b"", ExitCode.INPUT),
+    ],
+)
+def test_one_message_and_the_right_code(
+    tmp_path: Path, content: bytes, code: ExitCode, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.png"
+    path.write_bytes(content)
+    ended, out, err = run(["bead", "measure", str(path), "-o", str(tmp_path / "r")], capsys)
+    assert ended == code
+    assert "x.png" in err
+    assert not out
+    assert not (tmp_path / "r").exists()
+
+
+def test_nothing_to_measure_is_a_usage_error(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(["bead", "measure"], capsys)
+    assert code == ExitCode.USAGE
+    assert "name a photo" in err
