@@ -59,7 +59,7 @@ class BeadMeasurement:
         return self.confidence >= TRUSTED
 
 
-TRUSTED = 0.5
+TRUSTED = 0.7
 """Confidence below which a width is printed as doubtful."""
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from seamlog.analysis.bead.assess import AssessedPhoto, assess_photos
+from seamlog.analysis.bead.measurement import TRUSTED
 from seamlog.analysis.bead.sources import photo_files
 
 MEDIAN_ERROR = 0.08
@@ -50,7 +51,7 @@ def test_mean_width_of_real_beads(human_widths: dict[Path, float]) -> None:
 
 def test_no_trusted_width_is_far_off(human_widths: dict[Path, float]) -> None:
     for path, (error, confidence) in relative_errors(human_widths).items():
-        assert abs(error) <= WORST_TRUSTED or confidence < 0.5, path.stem
+        assert abs(error) <= WORST_TRUSTED or confidence < TRUSTED, path.stem
 
 
 def test_messy_photos_never_give_millimetres(data_dir: Path) -> None:
@@ -69,4 +70,4 @@ def test_messy_photos_never_give_millimetres(data_dir: Path) -> None:
 def test_a_plate_before_welding_has_no_trusted_width(data_dir: Path) -> None:
     for path in (data_dir / "bead_bam" / "WID417_pre.JPG", *(data_dir / "seam").glob("*.png")):
         document = assessed(path).summary()
-        assert document["refused"] or document["confidence"] < 0.5, path.name
+        assert document["refused"] or document["confidence"] < TRUSTED, path.name
