@@ -156,6 +156,5 @@ def _solver(curvature: "NDArray[np.float64]") -> Any:
         eps_rel=1e-9,
         max_iter=20_000,
         adaptive_rho_interval=25,
-        polishing=True,
     )
     return solver

@@ -1,7 +1,3 @@
-import hashlib
-import os
-import subprocess
-import sys
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +7,7 @@ from seamlog.analysis.closed_loop import Reference, simulate
 from seamlog.analysis.dynamics import CoulombPlant
 from seamlog.contracts import Axis
 
-from .axis_bench import COULOMB_AXIS, PERIOD_S, sine, speed_noise
+from .axis_bench import COULOMB_AXIS, PERIOD_S
 
 
 class Recited:
@@ -72,47 +68,3 @@ def test_disturbance_acts_over_the_period_after_its_sample() -> None:
     moved = CoulombPlant(COULOMB_AXIS, PERIOD_S).step(0.0, 0.0, 3.0)
     assert run.velocity_m_s.tolist()[:3] == [0.0, 0.0, 0.0]
     assert (run.position_m[3], run.velocity_m_s[3]) == moved
-
-
-_SCRIPT = """
-import hashlib
-from tests.analysis.test_closed_loop import adaptive_bits
-print(adaptive_bits())
-"""
-
-
-def adaptive_bits() -> str:
-    from seamlog.analysis.controllers.adaptive import AdaptiveConfig, AdaptiveController
-
-    controller = AdaptiveController(AdaptiveConfig(), COULOMB_AXIS, PERIOD_S)
-    noise = np.round(speed_noise(2, 500), 9)
-    reference = sine(0.1, 1.0, 500)
-    rounded = Reference(
-        *(
-            np.round(column, 9)
-            for column in (
-                reference.position_m,
-                reference.velocity_m_s,
-                reference.acceleration_m_s2,
-            )
-        )
-    )
-    run = simulate(controller, COULOMB_AXIS, rounded, PERIOD_S, velocity_noise_m_s=noise)
-    return hashlib.sha256(run.command.tobytes() + run.position_m.tobytes()).hexdigest()
-
-
-def test_the_same_bits_without_the_processors_extras(project: os.PathLike[str]) -> None:
-    plain = os.environ | {
-        "NPY_DISABLE_CPU_FEATURES": "AVX2 FMA3 AVX512F AVX512_SKX",
-        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX2_Usable,-FMA_Usable",
-        "PYTHONWARNINGS": "ignore",
-    }
-    result = subprocess.run(
-        [sys.executable, "-c", _SCRIPT],
-        cwd=project,
-        env=plain,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert result.stdout.strip().splitlines()[-1] == adaptive_bits()

@@ -169,7 +169,7 @@ def test_the_stability_limit_is_where_the_loop_diverges(delay: int, kd: float) -
         ("disturbance_observer", {"gain": 0.9}, "gain"),
     ],
 )
-def test_each_broken_limit_is_named(name: str, values: dict[str, float], told: str) -> None:
+def test_each_broken_limit_is_named(name: str, values: dict[str, Any], told: str) -> None:
     assert any(told in warning for warning in make(name, **values).warnings())
 
 
