@@ -12,6 +12,8 @@ from seamlog.analysis.controllers.own import config_of, is_own, load_own, own_cl
 from seamlog.contracts import Axis, Controller, Estimator
 from seamlog.errors import ConfigError, UsageError
 
+from .guard import make_guarded_estimator
+
 
 @dataclass(frozen=True)
 class ControllerChoice:
@@ -68,12 +70,19 @@ def _choice(name: str, factory: Any, values: Mapping[str, Any]) -> ControllerCho
 
 
 def choose_estimator(name: str, values: Mapping[str, Any]) -> EstimatorChoice:
-    """Find estimator `name` and check its configuration (`UnknownName`, `ConfigError`)."""
+    """Find estimator `name` and check its configuration (`UnknownName`, `ConfigError`).
+
+    Estimators that are not seamlog's own run behind a guard, which raises `PluginFailed`.
+    """
     factory = plugins.load("seamlog.estimators", name)
     config = _configured(factory.Config, values, f"replay.estimators.{name}")
 
+    trusted = str(getattr(factory, "__module__", "")).startswith("seamlog.")
+
     def make(period_s: float) -> Estimator:
-        return cast(Estimator, factory(config, period_s))
+        if trusted:
+            return cast(Estimator, factory(config, period_s))
+        return make_guarded_estimator(factory, config, period_s, name)
 
     return EstimatorChoice(name, config.model_dump(mode="json"), make)
 

@@ -81,6 +81,10 @@ def _findings(found: Replay) -> list[Finding]:
                 "recorded moments; it predicts no tracking error"
             )
             messages.append((Severity.INFO, text))
+    for watcher in found.estimators:
+        if not np.isfinite(watcher.trace.parameters[-1]).all():
+            text = f"{watcher.choice.name}: the estimate is no finite number at the end"
+            messages.append((Severity.WARNING, text))
     share = float(found.record.saturated.mean())
     if share > MUCH_SATURATED:
         text = (

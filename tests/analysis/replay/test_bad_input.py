@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from seamlog.analysis.replay.figures import UNSTABLE
+from seamlog.analysis.replay.guard import make_guarded_estimator
 from seamlog.analysis.replay.inputs import replay_inputs
+from seamlog.analysis.replay.shadow import shadow_estimator
 from seamlog.cli import run
-from seamlog.errors import EvidenceError
+from seamlog.errors import EvidenceError, PluginFailed
 from seamlog.mcap.batch import BatchWriter
 from seamlog.results import Results
 
@@ -119,3 +121,31 @@ def test_a_loop_that_runs_away_has_no_figure(
     assert figure is not None
     assert figure.value is None
     assert figure.reason == UNSTABLE
+
+
+class Broken:
+    """An estimator of somebody else."""
+
+    def __init__(self, config: object, period_s: float) -> None:
+        self.count = 0
+
+    def update(self, position_m: float, velocity_m_s: float, applied_command: float) -> float:
+        self.count += 1
+        if self.count > 5:
+            raise ZeroDivisionError("no inertia")
+        return float("nan")
+
+    def parameters(self) -> tuple[float, float]:
+        return 1.0, 2.0
+
+    def variances(self) -> tuple[float, float, float]:
+        return 1.0, 2.0, 3.0
+
+
+def test_an_estimator_that_fails_is_named_with_its_sample(loop: MakeLoop) -> None:
+    with pytest.raises(PluginFailed, match=r"'odd' failed at sample 5: ZeroDivisionError"):
+        guarded = make_guarded_estimator(Broken, None, 0.04, "odd")
+        for _ in range(6):
+            guarded.update(0.0, 0.0, 0.0)
+    with pytest.raises(PluginFailed, match="ValueError"):
+        shadow_estimator(make_guarded_estimator(Broken, None, 0.04, "odd"), loop(), 1)
