@@ -1,6 +1,8 @@
 """A user's own controller: found, run, and every way in which it can fail."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,9 @@ from seamlog.analysis.replay.factories import (
     choose_own_controller,
     controller_label,
 )
+from seamlog.cli import run as cli_run
 from seamlog.errors import ConfigError, InputError, PluginFailed, UnknownName, UsageError
+from seamlog.session import open_session
 from tests.analysis.axis_bench import COULOMB_AXIS, PERIOD_S, sine
 
 LAW = """
@@ -109,3 +113,24 @@ def test_what_is_no_controller_is_refused(
 def test_a_recorded_name_never_runs_a_file(tmp_path: Path) -> None:
     with pytest.raises(UnknownName):
         choose_controller(write(tmp_path), {})
+
+
+def test_the_command_replays_through_a_file_and_tells_its_faults(
+    project: Path,
+    tmp_path: Path,
+    loop: Callable[..., Any],
+    session_of: Callable[..., Path],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    session, out = session_of(loop()), tmp_path / "out.mcap"
+    own = f"{project / 'examples' / 'own_controller.py'}:Springy"
+    words = ["replay", str(session), "-o", str(out), "--set", "replay.members=2", "--controller"]
+    assert cli_run([*words, own]) == 0
+    with open_session(out) as opened:
+        assert opened.info.channels["/replay/Springy/shadow/command"].count == 750
+        assert opened.info.channels["/replay/Springy/counterfactual/encoder"].count == 750
+    capsys.readouterr()
+    broken = write(tmp_path, said="if self.count == 76: return float('nan')")
+    assert cli_run([*words, broken, "--force"]) != 0
+    told = capsys.readouterr().err
+    assert "'Law'" in told and "3.000 s" in told and "Traceback" not in told
