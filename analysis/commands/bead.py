@@ -52,7 +52,8 @@ def measure(
 ) -> Outcome:
     """Measure width and evenness of the bead on PHOTOs, in mm with a calibration, else in px.
 
-    Refuses (exit code 6) a photo in which no bead can be told from the plate.
+    Refuses (exit code 6) a photo in which no bead can be told from the plate; the results, if
+    asked for, then say why.
     """
     from seamlog.analysis.bead.assess import assess_photos
     from seamlog.analysis.bead.part import BeadConfig
@@ -62,10 +63,10 @@ def measure(
     settled = load_config(BeadConfig, "bead", config, settings)
     sources = _sources(photos, session, calibration)
     assessed = assess_photos(sources, start, settled, weld)
-    if len(assessed) == 1 and assessed[0].refusal is not None:
-        raise assessed[0].refusal
     if output is not None:
         _write(output, assessed)
+    if len(assessed) == 1 and assessed[0].refusal is not None:
+        raise assessed[0].refusal
     return _outcome(assessed, output)
 
 
