@@ -9,6 +9,7 @@ from seamlog.command import command, force_option, output_option, session_argume
 from seamlog.outcome import Outcome
 
 if TYPE_CHECKING:
+    from seamlog.analysis.axis_record import AxisRecord
     from seamlog.results import Figure, Part
 
 
@@ -16,23 +17,31 @@ if TYPE_CHECKING:
 @session_argument
 @click.option(
     "--method",
-    type=click.Choice(["auto", "gated", "idim-ls"]),
+    type=click.Choice(["auto", "gated", "batch", "idim-ls", "idim-iv", "output-error"]),
     default="auto",
     show_default=True,
-    help="By sampling rate; gated for slow loops, idim-ls for fast records.",
+    help="auto: by sampling rate; gated for slow loops, idim-ls for fast records.",
 )
 @click.option(
     "--friction",
-    type=click.Choice(["symmetric", "asymmetric"]),
+    type=click.Choice(
+        ["auto", "symmetric", "asymmetric", "symmetric-stribeck", "asymmetric-stribeck"]
+    ),
     default="symmetric",
     show_default=True,
-    help="One friction for both directions (and an offset), or one for each.",
+    help="Friction model; auto: model and lag by cross-validation on the record.",
 )
 @click.option(
     "--compare",
     "reference",
     type=click.Path(path_type=Path),
     help="Published values (TOML) to set beside the identified ones.",
+)
+@click.option(
+    "--validate",
+    "other",
+    type=click.Path(path_type=Path),
+    help="Another session of the same axis that the identified model has to predict.",
 )
 @click.option("--weld", type=int, help="Use only the motion of this weld.")
 @output_option("Results directory to write the part 'identification' to.", required=False)
@@ -42,6 +51,7 @@ def identify(
     method: Any,
     friction: Any,
     reference: Path | None,
+    other: Path | None,
     weld: int | None,
     output: Path | None,
     force: bool,
@@ -60,7 +70,7 @@ def identify(
     if output is not None:
         check_output(output / "identification.json", force) if output.is_dir() else None
     published = load_reference(reference) if reference else None
-    options = IdentifyOptions(method, friction, published, reference)
+    options = IdentifyOptions(method, friction, _record_of(other), published, reference)
     with open_session(session) as opened:
         place = chosen_welds(opened, weld)[0] if weld is not None else None
         part, tables = identify_session(opened, place, options)
@@ -68,6 +78,16 @@ def identify(
         Results.create(output).write(part, tables)
     source = published.source if published else ""
     return Outcome("seamlog.identify", text_of(part, source), document_of(part))
+
+
+def _record_of(path: Path | None) -> "AxisRecord | None":
+    from seamlog.analysis.axis_record import load_axis_record
+    from seamlog.session import open_session
+
+    if path is None:
+        return None
+    with open_session(path) as opened:
+        return load_axis_record(opened)
 
 
 def document_of(part: "Part") -> dict[str, Any]:

@@ -9,7 +9,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from seamlog.errors import ConfigError, InputError
 
-from .method import Friction, Identification
+from .friction_models import Friction
+from .method import Identification
 
 
 class ReferenceValue(BaseModel):
@@ -33,7 +34,8 @@ class Reference(BaseModel):
 
     def values(self, friction: Friction) -> dict[str, ReferenceValue]:
         """The table of one friction model."""
-        return self.symmetric if friction == "symmetric" else self.asymmetric
+        known = {"symmetric": self.symmetric, "asymmetric": self.asymmetric}
+        return known.get(friction, {})
 
 
 @dataclass(frozen=True)
@@ -66,10 +68,16 @@ def load_reference(path: Path) -> Reference:
 
 
 def compare(found: Identification, reference: Reference) -> list[Comparison]:
-    """Rows for what both have; `ConfigError` if that is nothing."""
+    """Rows for what both have; `ConfigError` if that is nothing.
+
+    Deviations are those of a white residual on both sides: that is what is published.
+    """
     fit = found.fit
     own: dict[str, tuple[float, float | None]] = {
-        name: (fit.value(name), fit.deviation(name)) for name in fit.names
+        name: (value, sd)
+        for name, value, sd in zip(
+            fit.names, fit.values.tolist(), fit.white_sd.tolist(), strict=True
+        )
     }
     own["condition_number"] = (fit.condition_number, None)
     own["residual_norm"] = (fit.residual_norm, None)

@@ -6,6 +6,7 @@ import numpy as np
 
 from seamlog.errors import EvidenceError
 
+from .friction_models import is_physical
 from .method import Identification, Motion
 
 SLOWEST_M_S = 0.001
@@ -102,4 +103,4 @@ def _vague(found: Identification) -> list[str]:
 def _physical(found: Identification) -> list[tuple[str, float, float]]:
     fit = found.fit
     rows = zip(fit.names, fit.values.tolist(), fit.sd.tolist(), strict=True)
-    return [row for row in rows if row[0] != "offset"]
+    return [row for row in rows if is_physical(row[0])]

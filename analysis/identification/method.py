@@ -1,23 +1,15 @@
 """What all identification methods share: what they are given and what they give back."""
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .filtering import FloatArray
+from .friction_models import FloatArray, Friction
 from .regression import Fit
 
-Friction = Literal["symmetric", "asymmetric"]
-SYMMETRIC = ("inertia", "viscous_friction", "coulomb_friction", "offset")
-ASYMMETRIC = (
-    "inertia",
-    "viscous_friction_positive",
-    "coulomb_friction_positive",
-    "viscous_friction_negative",
-    "coulomb_friction_negative",
-)
+Method = Literal["auto", "gated", "batch", "idim-ls", "idim-iv", "output-error"]
 
 
 @dataclass(frozen=True)
@@ -31,36 +23,40 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Rows:
+    """A linear regression ready to solve; all of one length.
+
+    `block` numbers rows whose errors may resemble each other: a stretch of sliding, or a second.
+    `position_m` and `velocity_m_s` say where and how fast the axis was.
+    """
+
+    names: tuple[str, ...]
+    regressor: FloatArray
+    measured: FloatArray
+    block: NDArray[np.int64]
+    position_m: FloatArray
+    velocity_m_s: FloatArray
+    stamp_ns: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
 class Identification:
     """Axis parameters in `unit` of force or command per SI, and what they rest on."""
 
     method: str
     friction: Friction
     fit: Fit
+    rows: Rows
     motion: Motion
-    stamp_ns: NDArray[np.int64]
-    """Time of each row of the fit."""
     unit: str
     delay_periods: int
     settings: dict[str, float | int | str]
+    notes: tuple[str, ...] = ()
+    """What was left out or added, for people."""
+    extras: dict[str, Any] = field(default_factory=dict)
+    """JSON-ready details of the method: servo, ripple, simulation."""
 
-
-def friction_columns(velocity_m_s: FloatArray, friction: Friction) -> list[FloatArray]:
-    """Regressor columns after the one of the inertia, in the order of the parameter names."""
-    direction = np.sign(velocity_m_s)
-    if friction == "symmetric":
-        return [velocity_m_s, direction, np.ones_like(velocity_m_s)]
-    forward, backward = (1 + direction) / 2, (1 - direction) / 2
-    return [velocity_m_s * forward, forward, velocity_m_s * backward, -backward]
-
-
-def names_of(friction: Friction) -> tuple[str, ...]:
-    """Parameter names of a friction model."""
-    return SYMMETRIC if friction == "symmetric" else ASYMMETRIC
-
-
-def unit_of(name: str, unit: str) -> str:
-    """Unit of a parameter when the force (or command) is in `unit`; newtons give kilograms."""
-    if name.startswith("inertia"):
-        return "kg" if unit == "N" else f"{unit} s^2/m"
-    return f"{unit} s/m" if name.startswith("viscous") else unit
+    @property
+    def stamp_ns(self) -> NDArray[np.int64]:
+        """Time of each row of the fit."""
+        return self.rows.stamp_ns

@@ -11,16 +11,17 @@ from hypothesis import strategies as st
 
 from seamlog.analysis.axis_record import AxisRecord, Drive
 from seamlog.analysis.closed_loop import Reference
-from seamlog.analysis.identification.excitation import Excitation, judge_excitation
+from seamlog.analysis.identification.excitation import judge_excitation
 from seamlog.analysis.identification.gated import identify_gated
 from seamlog.analysis.identification.identify import identify_axis
 from seamlog.analysis.identification.method import Identification
-from seamlog.analysis.identification.part import identification_part
-from seamlog.analysis.identification.regression import correlated_least_squares, least_squares
+from seamlog.analysis.identification.part import Doubts, identification_part
+from seamlog.analysis.identification.regression import least_squares
+from seamlog.analysis.identification.residuals import analyse_residual
 from seamlog.cli import run
 from seamlog.contracts import Axis
 from seamlog.errors import EvidenceError
-from tests.analysis.conftest import record_loop
+from tests.analysis.conftest import record_loop, sine_reference
 
 MakeLoop = Callable[..., AxisRecord]
 TRUTH = Axis(1.0, 2.14, 0.214, saturation=20.0, unit="N m")
@@ -99,13 +100,17 @@ def test_an_axis_at_rest_is_refused(loop: MakeLoop) -> None:
         identify_axis(loop(reference=line(0.0)))
 
 
-def test_a_slow_loop_without_velocity_is_refused(loop: MakeLoop) -> None:
-    record = loop()
+def test_a_slow_loop_without_velocity_is_smoothed(loop: MakeLoop) -> None:
+    record = loop(reference=sine_reference(60.0))
     bare = replace(record, velocity_m_s=np.full(len(record), np.nan))
-    with pytest.raises(EvidenceError, match="no velocity"):
-        identify_axis(bare)
+    found, _ = identify_axis(bare)
+    np.testing.assert_allclose(found.fit.values[:3], [1.0, 2.14, 0.214], rtol=0.01)
+    assert "the record has no velocity: it was smoothed from the positions" in found.notes
     with pytest.raises(EvidenceError, match="needs 200 Hz"):
         identify_axis(bare, "idim-ls")
+    coarse = replace(bare, position_m=np.round(bare.position_m / 1e-4) * 1e-4)
+    with pytest.raises(EvidenceError, match="would bias the inertia"):
+        identify_axis(coarse)
 
 
 def test_refusal_is_exit_code_6_and_no_number(
@@ -125,7 +130,7 @@ def test_parameters_that_the_motion_mixes_are_named() -> None:
     step = np.repeat([1.0, -1.0], 50)
     regressor = np.column_stack([np.sin(np.arange(100)), step, 2 * step])
     with pytest.raises(EvidenceError, match="cannot tell b and c apart"):
-        least_squares(("a", "b", "c"), regressor, step)
+        least_squares(("a", "b", "c"), regressor, step, np.arange(100))
 
 
 def test_the_deviation_of_a_correlated_residual_is_not_understated() -> None:
@@ -135,7 +140,7 @@ def test_the_deviation_of_a_correlated_residual_is_not_understated() -> None:
     deviations = []
     for _ in range(200):
         noise = np.convolve(random.normal(size=429), np.ones(30), "valid")
-        fit = correlated_least_squares(("a", "b"), regressor, noise, 40)
+        fit = least_squares(("a", "b"), regressor, noise, np.arange(400) // 40)
         values.append(fit.values[0])
         deviations.append(fit.sd[0])
     assert np.mean(deviations) == pytest.approx(np.std(values), rel=0.35)
@@ -160,9 +165,9 @@ def test_a_value_that_no_axis_has_is_not_stated(loop: MakeLoop) -> None:
         assert figure is not None and figure.value is None and "no axis has" in figure.reason
 
 
-def _judged(record: AxisRecord) -> tuple[Identification, str, Excitation]:
+def _judged(record: AxisRecord) -> tuple[Identification, str, Doubts]:
     found, why = identify_axis(record)
-    return found, why, judge_excitation(found)
+    return found, why, Doubts(judge_excitation(found), analyse_residual(found), None)
 
 
 def test_a_reference_with_faults_lists_them(
