@@ -9,7 +9,7 @@ import pytest
 
 from seamlog.analysis.bead.synthetic import Scene, render
 from seamlog.cli import ExitCode, main
-from seamlog.results import Results
+from seamlog.results import Results, Verdict
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -71,7 +71,18 @@ def test_one_message_and_the_right_code(
     assert ended == code
     assert "x.png" in err
     assert not out
-    assert not (tmp_path / "r").exists()
+    assert (tmp_path / "r").exists() == (code is ExitCode.EVIDENCE)
+
+
+def test_a_refused_photo_has_its_place_in_the_results(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, folder = tmp_path / "x.png", tmp_path / "r"
+    assert cv2.imwrite(str(path), np.full((200, 300), 90, np.uint8))
+    assert run(["bead", "measure", str(path), "-o", str(folder)], capsys)[0] == ExitCode.EVIDENCE
+    (part,) = Results.open(folder).parts()
+    assert (part.verdict, part.figures[0].value) == (Verdict.NOT_MEASURABLE, None)
+    assert "x.png" in part.reason
 
 
 def test_nothing_to_measure_is_a_usage_error(capsys: pytest.CaptureFixture[str]) -> None:
