@@ -118,29 +118,31 @@ class StribeckPlant:
     def __init__(
         self, axis: Axis, period_s: float, substeps: int = 0, ripple: Ripple | None = None
     ) -> None:
-        self._forward, self._backward = axis, backward_axis(axis)
         self._substeps = substeps or max(1, round(period_s / 1e-3))
         self._step_s = period_s / self._substeps
+        self._gain, self._offset = self._step_s / axis.inertia, axis.offset
+        self._forward = _SlidingSide(axis, self._gain)
+        self._backward = _SlidingSide(backward_axis(axis), self._gain)
         self._ripple = ripple
 
     def step(
         self, position_m: float, velocity_m_s: float, command: float, disturbance: float = 0.0
     ) -> tuple[float, float]:
         """Position and velocity one period later; error of the order of the sub-step."""
-        forward, step_s = self._forward, self._step_s
-        gain = step_s / forward.inertia
-        force = command - forward.offset - disturbance
+        gain, half_s, ripple = self._gain, 0.5 * self._step_s, self._ripple
+        force = command - self._offset - disturbance
         for _ in range(self._substeps):
-            impulse = velocity_m_s + gain * (force - self._ripple_force(position_m))
-            axis = forward if impulse > 0.0 else self._backward
-            hold = gain * sliding_friction(axis, abs(velocity_m_s))
+            push = force if ripple is None else force - self._ripple_force(position_m)
+            impulse = velocity_m_s + gain * push
+            side = self._forward if impulse > 0.0 else self._backward
+            hold = side.hold(velocity_m_s if velocity_m_s >= 0.0 else -velocity_m_s)
             if impulse > hold:
-                next_m_s = (impulse - hold) / (1.0 + gain * axis.viscous_friction)
+                next_m_s = (impulse - hold) / side.damping
             elif impulse < -hold:
-                next_m_s = (impulse + hold) / (1.0 + gain * axis.viscous_friction)
+                next_m_s = (impulse + hold) / side.damping
             else:
                 next_m_s = 0.0
-            position_m += 0.5 * step_s * (velocity_m_s + next_m_s)
+            position_m += half_s * (velocity_m_s + next_m_s)
             velocity_m_s = next_m_s
         return position_m, velocity_m_s
 
@@ -148,6 +150,28 @@ class StribeckPlant:
         if self._ripple is None:
             return 0.0
         return self._ripple.amplitude * math.sin(2.0 * math.pi * position_m / self._ripple.pitch_m)
+
+
+class _SlidingSide:
+    """Friction in one direction, as the change of speed over a sub-step."""
+
+    def __init__(self, axis: Axis, gain: float) -> None:
+        self.damping = 1.0 + gain * axis.viscous_friction
+        self._axis, self._gain = axis, gain
+        self._level = gain * axis.coulomb_friction
+        self._excess = gain * max(0.0, axis.static_friction - axis.coulomb_friction)
+        rises = self._excess > 0.0 and axis.stribeck_speed_m_s > 0.0
+        self._speed_m_s = axis.stribeck_speed_m_s
+        self._far_m_s = 40.0 * self._speed_m_s if rises and axis.stribeck_power == 1.0 else 0.0
+        self._general = rises and axis.stribeck_power != 1.0
+
+    def hold(self, speed_m_s: float) -> float:
+        """Gain times `sliding_friction`; beyond 40 Stribeck speeds nothing of the rise is left."""
+        if speed_m_s < self._far_m_s:
+            return self._level + self._excess * exponential(-speed_m_s / self._speed_m_s)
+        if self._general:
+            return self._gain * sliding_friction(self._axis, speed_m_s)
+        return self._level
 
 
 def make_plant(axis: Axis, period_s: float) -> CoulombPlant | StribeckPlant:

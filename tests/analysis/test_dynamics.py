@@ -101,6 +101,40 @@ def test_stribeck_friction_falls_from_static_to_coulomb() -> None:
     assert sliding_friction(powered, 0.004) == pytest.approx(0.214 + 0.043 * math.exp(-(2**1.5)))
 
 
+@given(st.floats(-0.3, 0.3), st.sampled_from([0.5, 1.0, 2.0]), st.floats(-3.0, 3.0))
+def test_a_sub_step_takes_the_level_of_friction_at_its_start(
+    velocity: float, power: float, command: float
+) -> None:
+    axis = replace(AXIS, stribeck_power=power)
+    step_s = 1e-3
+    _, after = StribeckPlant(axis, step_s, substeps=1).step(0.0, velocity, command)
+    impulse = velocity + step_s * command
+    hold = step_s * sliding_friction(axis, abs(velocity))
+    expected = math.copysign(max(abs(impulse) - hold, 0.0), impulse)
+    assert after == pytest.approx(expected / (1 + step_s * axis.viscous_friction), abs=1e-15)
+
+
+@pytest.mark.parametrize("make", [CoulombPlant, StribeckPlant])
+def test_friction_may_differ_by_direction(make: type[CoulombPlant] | type[StribeckPlant]) -> None:
+    there = replace(COULOMB_AXIS, viscous_friction=3.0, coulomb_friction=0.5)
+    back = replace(COULOMB_AXIS, viscous_friction=1.0, coulomb_friction=0.1)
+    both = replace(there, viscous_friction_negative=1.0, coulomb_friction_negative=0.1)
+    plant, forward, backward = (make(axis, PERIOD_S) for axis in (both, there, back))
+    for velocity, command in ((0.05, 1.0), (0.0, 0.6), (0.2, -1.0)):
+        assert plant.step(0.0, velocity, command) == forward.step(0.0, velocity, command)
+        assert plant.step(0.0, -velocity, -command) == backward.step(0.0, -velocity, -command)
+    assert plant.step(0.0, 0.0, 0.3) == (0.0, 0.0)
+    assert plant.step(0.0, 0.0, -0.3)[1] < 0.0
+
+
+def test_a_turn_meets_the_friction_of_both_directions() -> None:
+    axis = replace(COULOMB_AXIS, viscous_friction_negative=4.0, coulomb_friction_negative=0.5)
+    exact = CoulombPlant(axis, PERIOD_S).step(0.0, 0.02, -2.0)
+    fine = StribeckPlant(axis, PERIOD_S, substeps=40_000).step(0.0, 0.02, -2.0)
+    assert exact[1] < 0.0
+    assert exact == pytest.approx(fine, abs=1e-6)
+
+
 def test_smallest_dead_zone_has_the_published_ratios() -> None:
     assert smallest_dead_zone_m_s(AXIS) == pytest.approx(3.48 * 0.002, rel=1e-3)
     gaussian = replace(AXIS, stribeck_power=2.0)
