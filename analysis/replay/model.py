@@ -20,6 +20,10 @@ from .windows import Windows, motion_windows
 _SUBSTEP_S = 0.005
 _NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 _LEAST_SHARE = 1e-3
+_HALF_WINDOWS_S = (0.02, 0.08, 0.12, 0.16)
+_SLOWEST_SHARE = 0.01
+_LARGEST_HIDDEN_EXCESS = 0.4
+"""Static friction beyond C, as a share of it, that an axis may have without the record telling."""
 _LARGEST_NOISE_SHARE = 0.02
 """Left-over squares beyond which acceleration by positions would bias the inertia."""
 
@@ -60,7 +64,21 @@ class AxisModel:
         weights = np.array([found.weight for found in self.explanations])
         found = self.explanations[random.choice(len(weights), p=weights / weights.sum())]
         values = random.multivariate_normal(found.values, found.covariance, method="svd")
-        return _explained(self.axis, replace(found, values=values))
+        axis, ripple = _explained(self.axis, replace(found, values=values))
+        if found.shape.stribeck_speed_m_s or self.windows is None:
+            return axis, ripple
+        return _with_hidden_stribeck(axis, self.windows, random), ripple
+
+
+def _with_hidden_stribeck(axis: Axis, windows: Windows, random: np.random.Generator) -> Axis:
+    """`axis` with Stribeck friction that would show only below the slowest windows."""
+    slowest_m_s = float(np.quantile(np.abs(windows.velocity_m_s), _SLOWEST_SHARE))
+    excess = axis.coulomb_friction * random.uniform(0.0, _LARGEST_HIDDEN_EXCESS)
+    return replace(
+        axis,
+        static_friction=axis.coulomb_friction + excess,
+        stribeck_speed_m_s=slowest_m_s * random.uniform(0.2, 0.5),
+    )
 
 
 def _with_values(axis: Axis, values: FloatArray) -> Axis:
@@ -121,16 +139,18 @@ def identify_model(record: AxisRecord, live: LiveController | None) -> AxisModel
 
 
 def _finer_model(record: AxisRecord, axis: Axis, covariance: FloatArray) -> AxisModel | None:
-    """The model from windows of positions, if they resolve the acceleration."""
-    windows = motion_windows(record, axis.delay_periods, axis.viscous_friction / axis.inertia)
-    found = explain(windows, len(record), record.period_s)
-    if not found or found[0].noise_share > _LARGEST_NOISE_SHARE:
-        return None
-    if np.any(found[0].values[:3] <= 0):
-        return None
-    told, ripple = _explained(axis, found[0])
-    method = "force balance over windows of positions"
-    return AxisModel(told, covariance, method, ripple, windows, tuple(found))
+    """The model from the shortest windows of positions that resolve the acceleration, if any."""
+    lag_1_s = axis.viscous_friction / axis.inertia
+    for half in dict.fromkeys(max(1, round(s / record.period_s)) for s in _HALF_WINDOWS_S):
+        windows = motion_windows(record, axis.delay_periods, lag_1_s, half)
+        found = explain(windows, len(record), record.period_s)
+        if not found or found[0].noise_share > _LARGEST_NOISE_SHARE:
+            continue
+        if np.all(found[0].values[:3] > 0):
+            told, ripple = _explained(axis, found[0])
+            method = "force balance over windows of positions"
+            return AxisModel(told, covariance, method, ripple, windows, tuple(found))
+    return None
 
 
 def _seen_saturation(record: AxisRecord) -> float:

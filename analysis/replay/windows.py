@@ -18,8 +18,6 @@ from seamlog.analysis.axis_record import AxisRecord, FloatArray
 
 from .shadow import applied_commands
 
-HALF_S = 0.02
-"""Half a window is the whole number of periods next to this, at least one."""
 _POINTS = 16
 _SLOWEST_M_S = 3e-4
 
@@ -45,10 +43,9 @@ class Windows:
         return np.asarray(values @ self.weights)
 
 
-def motion_windows(record: AxisRecord, delay_periods: int, lag_1_s: float) -> Windows:
-    """Windows of `record`; `lag_1_s` is b / a as far as it is known."""
+def motion_windows(record: AxisRecord, delay_periods: int, lag_1_s: float, half: int) -> Windows:
+    """Windows of twice `half` periods of `record`; `lag_1_s` is b / a as far as it is known."""
     period_s, x = record.period_s, record.position_m
-    half = max(1, round(HALF_S / period_s))
     span_s = half * period_s
     middle = np.arange(half, len(record) - half)
     before, now, after = x[middle - half], x[middle], x[middle + half]
