@@ -22,7 +22,7 @@ _NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 _LEAST_SHARE = 1e-3
 _HALF_WINDOWS_S = (0.02, 0.08, 0.12, 0.16)
 _SLOWEST_SHARE = 0.01
-_LARGEST_HIDDEN_EXCESS = 0.4
+LARGEST_HIDDEN_EXCESS = 0.4
 """Static friction beyond C, as a share of it, that an axis may have without the record telling."""
 _LARGEST_NOISE_SHARE = 0.02
 """Left-over squares beyond which acceleration by positions would bias the inertia."""
@@ -55,6 +55,12 @@ class AxisModel:
     windows: Windows | None = None
     explanations: tuple[Explanation, ...] = ()
 
+    @property
+    def hides_static_friction(self) -> bool:
+        """Whether no window is slow enough to show static friction."""
+        laws = [found.shape.stribeck_speed_m_s for found in self.explanations]
+        return bool(laws) and not any(laws)
+
     def drawn(self, random: np.random.Generator) -> tuple[Axis, RippleForce]:
         """One axis from the parameters' distribution; nothing physical falls below 0."""
         if not self.explanations:
@@ -73,7 +79,7 @@ class AxisModel:
 def _with_hidden_stribeck(axis: Axis, windows: Windows, random: np.random.Generator) -> Axis:
     """`axis` with Stribeck friction that would show only below the slowest windows."""
     slowest_m_s = float(np.quantile(np.abs(windows.velocity_m_s), _SLOWEST_SHARE))
-    excess = axis.coulomb_friction * random.uniform(0.0, _LARGEST_HIDDEN_EXCESS)
+    excess = axis.coulomb_friction * random.uniform(0.0, LARGEST_HIDDEN_EXCESS)
     return replace(
         axis,
         static_friction=axis.coulomb_friction + excess,

@@ -1,5 +1,6 @@
 """A replay as a part of the results: one table per run, rms and peak errors, the self-check."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from seamlog.welds import Weld
 from .check_original import OriginalCheck
 from .check_part import check_criteria, check_findings
 from .figures import UNSTABLE, model_misses, replay_figures
+from .model import LARGEST_HIDDEN_EXCESS, AxisModel
 from .run import Replay
 from .settings import ReplaySettings
 from .tables import replay_tables
@@ -85,6 +87,12 @@ def _findings(found: Replay) -> list[Finding]:
         if not np.isfinite(watcher.trace.parameters[-1]).all():
             text = f"{watcher.choice.name}: the estimate is no finite number at the end"
             messages.append((Severity.WARNING, text))
+    if found.model is not None and found.model.hides_static_friction:
+        text = (
+            "the record does not tell static friction beyond Coulomb friction; the bands allow "
+            f"for up to {100 * LARGEST_HIDDEN_EXCESS:.0f} % of it at low speed"
+        )
+        messages.append((Severity.INFO, text))
     share = float(found.record.saturated.mean())
     if share > MUCH_SATURATED:
         text = (
@@ -132,7 +140,22 @@ def _details(found: Replay) -> dict[str, Any]:
         "estimators": {run.choice.name: run.choice.config for run in found.estimators},
         "axis": None if model is None else _axis(model.axis),
         "identified_by": None if model is None else model.method,
+        "ripple": None if model is None else asdict(model.ripple),
+        "friction_laws": [] if model is None else _laws(model),
     }
+
+
+def _laws(model: AxisModel) -> list[dict[str, Any]]:
+    """The explanations that the ensemble draws from, with standard deviations."""
+    return [
+        {
+            "stribeck_power": found.shape.stribeck_power if found.value("excess") else None,
+            "likelihood": found.weight,
+            "values": dict(zip(found.names, found.values.tolist(), strict=True)),
+            "sd": dict(zip(found.names, np.sqrt(np.diag(found.covariance)).tolist(), strict=True)),
+        }
+        for found in model.explanations
+    ]
 
 
 def _axis(axis: Any) -> dict[str, Any]:
