@@ -112,9 +112,11 @@ def _table(ranked: Sequence[Ranked], sessions: Sequence[SessionFigures]) -> Any:
     }
     for name in dict.fromkeys(name for row in ranked for name in row.point.varied):
         columns[name] = _column([row.point.varied.get(name) for row in ranked])
-    lengths = ("value_mm", "u_mm", "low_mm", "high_mm", "behind_mm", "u_behind_mm")
+    lengths = ("value_mm", "low_mm", "high_mm", "behind_mm")
     for name in lengths:
         columns[name] = np.array([getattr(row, name) for row in ranked])
+    columns["sd_mm"] = np.array([row.u_mm for row in ranked])
+    columns["sd_behind_mm"] = np.array([row.u_behind_mm for row in ranked])
     for place, found in enumerate(sessions if len(sessions) > 1 else ()):
         columns[f"{found.path.stem}_mm"] = np.array([row.by_session_mm[place] for row in ranked])
     columns["told_apart"] = np.array([row.told_apart for row in ranked])
