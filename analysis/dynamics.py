@@ -62,8 +62,10 @@ class CoulombPlant:
             decay, travel, speed_gain, travel_gain, friction = self._forward
         elif velocity_m_s < 0.0:
             decay, travel, speed_gain, travel_gain, friction = self._backward
-        else:
+        elif velocity_m_s == 0.0:
             return self._step_from_rest(position_m, force)
+        else:
+            return math.nan, math.nan
         net = force - friction
         end_m_s = decay * velocity_m_s + speed_gain * net
         if (end_m_s < 0.0) if velocity_m_s > 0.0 else (end_m_s > 0.0):
@@ -141,7 +143,7 @@ class StribeckPlant:
             elif impulse < -hold:
                 next_m_s = (impulse + hold) / side.damping
             else:
-                next_m_s = 0.0
+                next_m_s = 0.0 if impulse == impulse else impulse
             position_m += half_s * (velocity_m_s + next_m_s)
             velocity_m_s = next_m_s
         return position_m, velocity_m_s

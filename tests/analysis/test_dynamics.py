@@ -170,3 +170,15 @@ def test_datasheet_values_become_what_the_motor_sees() -> None:
     assert axis.viscous_friction == pytest.approx(90.0 * ratio_m)
     assert axis.coulomb_friction == pytest.approx(6.0 * ratio_m)
     assert axis.unit == "N m"
+
+
+@pytest.mark.parametrize("make", [CoulombPlant, StribeckPlant])
+@pytest.mark.parametrize(
+    "state", [(math.nan, 0.1, 1.0), (0.0, math.nan, 0.0), (0.0, 0.0, math.nan)]
+)
+def test_what_is_not_a_number_never_becomes_one(
+    make: type[CoulombPlant] | type[StribeckPlant], state: tuple[float, float, float]
+) -> None:
+    assert math.isnan(make(COULOMB_AXIS, PERIOD_S).step(*state)[0])
+    if not math.isnan(state[0]):
+        assert math.isnan(make(COULOMB_AXIS, PERIOD_S).step(*state)[1])
