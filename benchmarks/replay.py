@@ -2,7 +2,9 @@
 
 Speed: 60 s of the 40 ms loop of the axis bench under the paper's law, CPU time. Peers: the same
 loop in 1 ms sub-steps of plain Python, scipy's LSODA from sample to sample (sign by
-tanh(v / 1e-4 m/s)), python-control (1 ms map). Tracking: the tunings of tracking.toml.
+tanh(v / 1e-4 m/s)), python-control (1 ms map). One run alone is bound by Python itself: the call
+of a plug-in law is about half of it; batches are where the peers stay behind. Tracking: the
+tunings of tracking.toml.
 """
 
 import math
