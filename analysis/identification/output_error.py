@@ -33,8 +33,10 @@ from .simulation import AxisForces, axis_forces, simulate_commands, simulate_ser
 Loop = Literal["auto", "closed", "open"]
 HELD_PERIODS = 0.5
 """Lag that holding the command over a period makes by itself; a simulation has it already."""
-_COARSE_TO_FINE = (3e-2, 1e-2, 3e-3, 1e-3)
+_COARSE_TO_FINE = (3e-2, 1e-2, 1e-3)
 """Steps of the numerical Jacobian in open loop, where stick and slip make the error jagged."""
+_KICKS = 8
+"""Fresh starts near the best fit so far, for the same reason; the same ones each time."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,7 @@ def identify_output_error(
     start = least_squares(rows.names, rows.regressor, rows.measured, rows.block)
     servo, why = _servo(run.record, loop)
     task = _closed(run, rows, settings, servo) if servo else _open(run, rows, settings)
-    steps = (1e-4,) if servo else _COARSE_TO_FINE
-    fit = _refined(task, start, rows, steps)
+    fit = _refined(task, start, rows)
     axis = axis_forces(fit.names, fit.values.tolist(), FAST_STRIBECK_M_S)
     return Identification(
         method="output-error",
@@ -155,25 +156,54 @@ def _open(run: FilteredRun, rows: Rows, settings: IdimSettings) -> _Task:
     return _Task("open", rows.names, reduced(run.record.position_m), outputs)
 
 
-def _refined(task: _Task, start: Fit, rows: Rows, steps: tuple[float, ...]) -> Fit:
+def _refined(task: _Task, start: Fit, rows: Rows) -> Fit:
     scale = np.maximum(np.abs(start.values), start.value("inertia") * 0.05)
 
     def missed(relative: FloatArray) -> FloatArray:
         return task.outputs(relative * scale) - task.wanted
 
-    found = start.values / scale
+    closed = task.loop == "closed"
+    best = _descended(missed, start.values / scale, (1e-4,) if closed else _COARSE_TO_FINE)
+    if not closed:
+        best = _kicked(missed, best, start, scale)
+    jacobian = np.asarray(best.jac / scale, dtype=np.float64)
+    return _fit(task, rows, best.x * scale, jacobian, best.fun)
+
+
+def _descended(
+    missed: Callable[[FloatArray], FloatArray], start: FloatArray, steps: tuple[float, ...]
+) -> optimize.OptimizeResult:
     for step in steps:
-        result = optimize.least_squares(
-            missed, found, diff_step=np.full(len(found), step), max_nfev=12
-        )
-        found = result.x
-    jacobian = np.asarray(result.jac / scale, dtype=np.float64)
-    return _fit(task, rows, found * scale, jacobian, missed(found))
+        each = np.full(len(start), step)
+        found = optimize.least_squares(missed, start, diff_step=each, max_nfev=12)
+        start = found.x
+    return found
+
+
+def _kicked(
+    missed: Callable[[FloatArray], FloatArray],
+    best: optimize.OptimizeResult,
+    start: Fit,
+    scale: FloatArray,
+) -> optimize.OptimizeResult:
+    """Basin hopping: kicks of 0.5 % of the inertia, 5 % of friction, 30 % near rest."""
+    random = np.random.default_rng(0)
+    size = np.array([_kick(name) for name in start.names]) * np.abs(best.x)
+    size = np.maximum(size, 0.06 * start.value("inertia") * 0.05 / scale)
+    for _ in range(_KICKS):
+        found = _descended(missed, best.x + random.normal(0, size), _COARSE_TO_FINE[1:])
+        best = found if found.cost < best.cost else best
+    return best
+
+
+def _kick(name: str) -> float:
+    return 0.005 if name == "inertia" else 0.3 if name.startswith("stribeck") else 0.05
 
 
 def _fit(
     task: _Task, rows: Rows, values: FloatArray, jacobian: FloatArray, missed: FloatArray
 ) -> Fit:
+    """The fit at a minimum; `missed` is predicted - wanted there."""
     require_apart(task.names, jacobian)
     inverse = np.asarray(np.linalg.inv(jacobian.T @ jacobian), dtype=np.float64)
     block = np.linspace(0, rows.block.max() + 1, len(missed), endpoint=False).astype(np.int64)
