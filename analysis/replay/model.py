@@ -21,6 +21,9 @@ _SUBSTEP_S = 0.005
 _NAMES = ("inertia", "viscous_friction", "coulomb_friction", "offset")
 _LEAST_SHARE = 1e-3
 _HALF_WINDOWS_S = (0.02, 0.08, 0.12, 0.16)
+_DELAYS = (0, 1, 2, 3)
+_DECISIVE = 3.0
+"""A delay is told by the motion if it leaves over that much less than any other."""
 _SLOWEST_SHARE = 0.01
 LARGEST_HIDDEN_EXCESS = 0.4
 """Static friction beyond C, as a share of it, that an axis may have without the record telling."""
@@ -54,6 +57,8 @@ class AxisModel:
     ripple: RippleForce = RippleForce()
     windows: Windows | None = None
     explanations: tuple[Explanation, ...] = ()
+    delay_from: str = ""
+    """Who says how many periods the command takes to act."""
 
     @property
     def hides_static_friction(self) -> bool:
@@ -125,7 +130,7 @@ def replay_plant(axis: Axis, period_s: float) -> Plant:
 
 def identify_model(record: AxisRecord, live: LiveController | None) -> AxisModel:
     """Identify `record` and take delay and saturation from the live loop where it told them."""
-    delay = live.axis.delay_periods if live else USUAL_DELAY
+    delay, delay_from = _delay(record, live)
     found, _ = identify_axis(record, delay_periods=delay)
     scale = record.drive.scale
     values = found.fit.values / scale
@@ -141,7 +146,27 @@ def identify_model(record: AxisRecord, live: LiveController | None) -> AxisModel
     )
     covariance = found.fit.covariance / scale**2
     finer = _finer_model(record, axis, covariance)
-    return finer or AxisModel(with_stribeck(record, axis), covariance, found.method)
+    model = finer or AxisModel(with_stribeck(record, axis), covariance, found.method)
+    return replace(model, delay_from=delay_from)
+
+
+def _delay(record: AxisRecord, live: LiveController | None) -> tuple[int, str]:
+    """Periods between a command and its effect, and who says so.
+
+    Where the session does not, the delay that explains the motion far better than the others.
+    """
+    if live is not None:
+        return live.axis.delay_periods, "the session"
+    half = max(1, round(_HALF_WINDOWS_S[0] / record.period_s))
+    shares = {}
+    for delay in _DELAYS:
+        windows = motion_windows(record, delay, 0.0, half)
+        found = explain(windows, len(record), record.period_s)
+        shares[delay] = found[0].noise_share if found else float("inf")
+    best, second = sorted(shares, key=lambda delay: shares[delay])[:2]
+    if shares[best] * _DECISIVE < shares[second]:
+        return best, "the motion itself"
+    return USUAL_DELAY, "assumption"
 
 
 def _finer_model(record: AxisRecord, axis: Axis, covariance: FloatArray) -> AxisModel | None:

@@ -87,6 +87,12 @@ def _findings(found: Replay) -> list[Finding]:
         if not np.isfinite(watcher.trace.parameters[-1]).all():
             text = f"{watcher.choice.name}: the estimate is no finite number at the end"
             messages.append((Severity.WARNING, text))
+    if found.model is not None and found.model.delay_from == "assumption":
+        text = (
+            f"a delay of {found.model.axis.delay_periods} period between command and effect is "
+            "assumed: neither the session nor the motion tells it"
+        )
+        messages.append((Severity.WARNING, text))
     if found.model is not None and found.model.hides_static_friction:
         text = (
             "the record does not tell static friction beyond Coulomb friction; the bands allow "
@@ -140,6 +146,7 @@ def _details(found: Replay) -> dict[str, Any]:
         "estimators": {run.choice.name: run.choice.config for run in found.estimators},
         "axis": None if model is None else _axis(model.axis),
         "identified_by": None if model is None else model.method,
+        "delay_from": None if model is None else model.delay_from,
         "ripple": None if model is None else asdict(model.ripple),
         "friction_laws": [] if model is None else _laws(model),
     }

@@ -60,6 +60,15 @@ def test_the_force_balance_tells_axis_ripple_and_drift_apart(loop: MakeLoop) -> 
     assert np.std(slow - drift) < 0.003
 
 
+@pytest.mark.parametrize("delay", [0, 1, 2])
+def test_the_motion_tells_the_delay(loop: MakeLoop, delay: int) -> None:
+    record = loop(truth=replace(TRUTH, delay_periods=delay))
+    model = identify_model(record, None)
+    assert model.axis.delay_periods == delay
+    assert model.delay_from == "the motion itself"
+    assert model.axis.inertia == pytest.approx(1.0, rel=0.01)
+
+
 def test_coarse_positions_leave_it_to_the_gated_identification(loop: MakeLoop) -> None:
     model = identify_model(disturbed_record(loop, encoder_step_m=5e-4), None)
     assert model.windows is None
