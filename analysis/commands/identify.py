@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 @session_argument
 @click.option(
     "--method",
-    type=click.Choice(["auto", "gated", "batch", "idim-ls", "idim-iv", "output-error"]),
+    type=click.Choice(
+        ["auto", "gated", "batch", "idim-ls", "idim-iv", "output-error", "open-loop"]
+    ),
     default="auto",
     show_default=True,
     help="auto: by sampling rate; gated for slow loops, idim-ls for fast records.",

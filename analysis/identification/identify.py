@@ -47,6 +47,8 @@ def identify_axis(
         return identify_idim_iv(record, friction, settings), why
     if method == "output-error":
         return identify_output_error(record, friction, settings), why
+    if method == "open-loop":
+        return identify_output_error(record, friction, settings, "open"), why
     return identify_idim_ls(record, friction, settings), why
 
 

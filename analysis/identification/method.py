@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from .friction_models import FloatArray, Friction
 from .regression import Fit
 
-Method = Literal["auto", "gated", "batch", "idim-ls", "idim-iv", "output-error"]
+Method = Literal["auto", "gated", "batch", "idim-ls", "idim-iv", "output-error", "open-loop"]
+"""`output-error` in closed loop where the record tells the drive's law; `open-loop` never."""
 
 
 @dataclass(frozen=True)

@@ -92,10 +92,11 @@ def refused_part(reason: str, inputs: list[Input]) -> Part:
 def figures(found: Identification) -> list[Figure]:
     """Parameters with standard uncertainty, then what tells how good the fit is."""
     fit, refused = found.fit, refused_values(found)
+    unit = "m" if _compares_positions(found) else found.unit
     return [
         *(_parameter(found, name, refused.get(name, "")) for name in fit.names),
         _figure("condition_number", fit.condition_number, None, ""),
-        _figure("residual_norm", fit.residual_norm, None, found.unit),
+        _figure("residual_norm", fit.residual_norm, None, unit),
         _figure("relative_error", 100 * fit.relative_error, None, "%"),
         _figure("used_share", 100 * found.motion.share, None, "%"),
     ]
@@ -110,6 +111,7 @@ def _parameter(found: Identification, name: str, refused: str) -> Figure:
 
 def _figure(name: str, value: float | None, u: float | None, unit: str, reason: str = "") -> Figure:
     label = name.replace("_", " ").replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+    label = label.replace(" mm s", " mm/s")
     label = {
         "used share": "share of the record used",
         "residual by position": "residual that follows place",
@@ -189,7 +191,7 @@ def _tables(found: Identification, residual: ResidualAnalysis) -> Tables:
     unit, fit = found.unit, found.fit
     forces = dict.fromkeys(("force", "predicted_force", "residual"), unit)
     tables: Tables = {}
-    if found.settings.get("loop") != "open":
+    if not _compares_positions(found):
         columns = {
             "stamp_ns": found.stamp_ns,
             "force": fit.measured,
@@ -200,6 +202,11 @@ def _tables(found: Identification, residual: ResidualAnalysis) -> Tables:
     tables["residual_by_position"] = _binned(residual.by_position, "position_mm", "mm", unit)
     tables["residual_by_speed"] = _binned(residual.by_speed, "speed_mm_s", "mm/s", unit)
     return tables
+
+
+def _compares_positions(found: Identification) -> bool:
+    """Whether the rows of the fit are positions (open loop), not forces."""
+    return found.settings.get("loop") == "open"
 
 
 def _binned(
