@@ -111,10 +111,11 @@ def gated_rows(
     delay_periods: int,
     settings: GatedSettings | None = None,
 ) -> Rows:
-    """The rows alone, for model selection."""
+    """The rows alone, for model selection; `EvidenceError` without enough motion."""
     settings = settings or GatedSettings()
     record, _ = with_velocity(without_repeats(record)[0])
     windows = _windows(unsaturated(record), delay_periods, settings.gate_m_s)
+    _require_motion(windows, settings.gate_m_s)
     return _rows(windows, friction, settings)
 
 
