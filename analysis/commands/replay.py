@@ -23,7 +23,12 @@ if TYPE_CHECKING:
 
 @command("replay")
 @session_argument
-@click.option("--controller", "controllers", multiple=True, help="Controller by name; repeatable.")
+@click.option(
+    "--controller",
+    "controllers",
+    multiple=True,
+    help="Controller by name, or path.py:Class; repeatable.",
+)
 @click.option("--estimator", "estimators", multiple=True, help="Estimator by name; repeatable.")
 @click.option(
     "--mode",
