@@ -22,6 +22,8 @@ _LEAST_GAIN = 0.03
 """Share of the remaining squares that a further effect must explain, for n rows of its own."""
 _NARROW_PITCH_M = 5e-4
 _LAGS = 20
+_RIDGE = 1e-10
+"""Keeps the search going where a tried effect looks like another one."""
 _ALIKE = 100
 """Rows whose misfit resembles each other, when friction laws are compared: few reversals decide."""
 _LEAST_WEIGHT = 0.05
@@ -98,8 +100,10 @@ def _columns(windows: Windows, shape: Shape, drift: FloatArray) -> FloatArray:
 
 def _left(windows: Windows, shape: Shape, drift: FloatArray) -> FloatArray:
     columns = _columns(windows, shape, drift)
-    values = np.linalg.lstsq(columns, windows.force, rcond=None)[0]
-    return np.asarray(windows.force - columns @ values)
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    square = np.einsum("ki,kj->ij", columns, columns) + _RIDGE * np.eye(columns.shape[1])
+    values = np.linalg.solve(square, np.einsum("ki,k->i", columns, windows.force))
+    return np.asarray(windows.force - np.einsum("ki,i->k", columns, values))
 
 
 def _squares(windows: Windows, shape: Shape, drift: FloatArray) -> float:
