@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+SOFT_PX = 2.0
+"""Blur of a toe from which on it may be the fading end of something rather than a toe."""
+
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
@@ -13,7 +16,8 @@ class Evidence:
     `apart`: distance of bead and plate at the worse toe, in standard deviations. `band`: evidence
     of the coarse band, 0 to 1. `flagged`: part of the stations. `rival` and `inner`: evidence of
     the best band beside and inside the found one, relative to it; `nested`: it lies itself inside
-    a more evident one. `step_grey`: the weaker toe's step in grey levels; `lengths`: length of the
+    a more evident one; `sharper`: how many times sharper than its toes a band inside is (0: none,
+    or not looked for). `step_grey`: the weaker toe's step in grey levels; `lengths`: length of the
     bead in widths (inf where it runs out of the photo at both ends). `width_px`; `astray`: distance
     between the sharpest edge and the change of looks, part of the width; `blur_px` of the sharper
     toe.
@@ -25,6 +29,7 @@ class Evidence:
     rival: float
     inner: float
     nested: bool
+    sharper: float
     step_grey: float
     lengths: float
     width_px: float
@@ -43,7 +48,8 @@ class Doubt:
 def doubts(evidence: Evidence) -> list[Doubt]:
     """All doubts, the worst first; the confidence of a width is that of its worst doubt."""
     e = evidence
-    tinted = np.clip((e.inner - 0.6) / 0.2, 0, 1) * np.clip((e.blur_px - 2.0) / 2.0, 0, 1)
+    inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
+    tinted = inside * np.clip((e.blur_px - SOFT_PX) / 2.0, 0, 1)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),

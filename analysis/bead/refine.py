@@ -27,14 +27,14 @@ def refine_toes(strip: Strip, extent: Extent, unit: float) -> tuple[Toes, Toes]:
     smooth = smoothed(strip.opponent, 0, along)
     sides = []
     for side, edge in ((-1, extent.left), (1, extent.right)):
-        signal, distance = _projection(smooth, strip.valid, edge, side, extent)
+        signal, distance = projection(smooth, strip.valid, edge, side, extent)
         near = _sharpest(signal, edge, side, 3 + 0.06 * float(np.median(extent.half)))
         places = locate_edges(signal, near, side)
         sides.append(_toes(strip, places, extent, edge, side, distance))
     return sides[0], sides[1]
 
 
-def _projection(
+def projection(
     opponent: Features, valid: NDArray[np.bool_], edge: Floats, side: int, extent: Extent
 ) -> tuple[NDArray[np.float32], float]:
     """The one colour mixture that tells bead from plate best at this toe, shape (rows, columns)."""

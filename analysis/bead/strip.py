@@ -1,7 +1,7 @@
 """The strip method: straighten the bead, find its toes, recentre, repeat, refine below a pixel."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from seamlog.errors import EvidenceError, ImageError
 
 from .band import BandSearch
+from .confidence import SOFT_PX
+from .core import band_inside, softness
 from .curve import arc_length, fit_centreline
 from .features import Features, smoothed, stack_texture, strip_features
 from .image import Photo
@@ -18,7 +20,7 @@ from .plane import Plane, Points
 from .refine import refine_toes
 from .sampling import Strip, sample_strip
 from .toes import Extent, find_toes
-from .width import BandEvidence, assemble
+from .width import BandEvidence, Toes, assemble
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +40,15 @@ class _Path:
     points: Points
     half: float
     band: BandEvidence
+
+
+@dataclass(frozen=True, slots=True)
+class _Traced:
+    """Both toes in the strip at the photo's own resolution."""
+
+    strip: Strip
+    extent: Extent
+    toes: tuple[Toes, Toes]
 
 
 def measure_strip(
@@ -78,18 +89,44 @@ def _most_trusted(
 
 def _measure(photo: Photo, plane: Plane, found: _Path, start: str | None) -> BeadMeasurement:
     unit = plane.unit_per_px(plane.to_px(found.points))
-    _refuse_narrow(photo, 2 * found.half / unit)
-    path, half = _extended(photo, plane, found.points, found.half), found.half
+    traced = _traced(photo, plane, found.points, found.half, unit)
+    band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit))
+    rows_per_station = _row_step(plane, unit)[0]
+    return assemble(photo, plane, traced.strip, traced.toes, rows_per_station, band, start)
+
+
+def _traced(photo: Photo, plane: Plane, points: Points, half: float, unit: float) -> _Traced:
+    _refuse_narrow(photo, 2 * half / unit)
+    path = _extended(photo, plane, points, half)
     strip, extent = _straighten(photo, plane, path, half, unit, freedom=0.45)
     for freedom in (0.35, 0.25):
         path = _recentred(strip, extent)
         half = float(np.median(extent.half)) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
         strip, extent = _straighten(photo, plane, path, half, unit, freedom)
-    rows_per_station, row_step = _row_step(plane, unit)
-    fine = _sampled(photo, plane, path, half, unit, row_step, unit)
-    toes = refine_toes(fine, _carried(strip, extent, fine), unit)
-    return assemble(photo, plane, fine, toes, rows_per_station, found.band, start)
+    fine = _sampled(photo, plane, path, half, unit, _row_step(plane, unit)[1], unit)
+    fine_extent = _carried(strip, extent, fine)
+    return _Traced(fine, fine_extent, refine_toes(fine, fine_extent, unit))
+
+
+def _sharper_inside(photo: Photo, plane: Plane, traced: _Traced, unit: float) -> float:
+    """How many times sharper a band inside is than the toes, each at its weaker side."""
+    if min(toe.blur_px for toe in traced.toes) <= SOFT_PX:
+        return 0.0
+    strip, extent = traced.strip, traced.extent
+    rows = np.arange(len(strip.line.s))[extent.present > 0]
+    if len(rows) < _COARSE:
+        return 0.0
+    middle = strip.line.shifted((traced.toes[0].offset + traced.toes[1].offset) / 2)[rows]
+    found = band_inside(photo, plane, middle, float(np.median(extent.half)) * strip.step, unit)
+    if found is None:
+        return 0.0
+    try:
+        inner = _traced(photo, plane, *found, unit)
+    except (EvidenceError, ImageError):
+        return 0.0
+    inside = max(softness(inner.strip, inner.extent, inner.toes))
+    return min(softness(strip, extent, traced.toes)) / max(inside, 1.0)
 
 
 def _extended(photo: Photo, plane: Plane, path: Points, half: float) -> Points:

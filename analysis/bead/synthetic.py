@@ -1,7 +1,8 @@
 """Rendered beads with exactly known toes, to check the measurement and the user's own set-up.
 
 A plane picture of a bead along a sine seam; both half widths vary smoothly and independently.
-Every nuisance (ripple, shading, specular line, dark toe, spatter, noise...) is a field of `Scene`.
+Every nuisance (ripple, shading, specular line, dark toe, spatter, heat tint, noise...) is a field
+of `Scene`.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,15 @@ from numpy.typing import NDArray
 
 from seamlog.calibration import PlaneCalibration
 
-from .synthetic_surface import Surface, brushed, smooth_noise, spatter_discs, specular_line
+from .synthetic_surface import (
+    Surface,
+    brushed,
+    film_colour,
+    film_nm,
+    smooth_noise,
+    spatter_discs,
+    specular_line,
+)
 
 Floats = NDArray[np.float64]
 
@@ -41,6 +50,8 @@ class Scene:
     spatter: int = 0
     perspective: float = 0.0
     gaps: int = 0
+    tint_mm: float = 0.0
+    tint_nm: float = 90.0
 
 
 CASES: dict[str, Scene] = {
@@ -71,10 +82,22 @@ CASES: dict[str, Scene] = {
 }
 """The named cases of the benchmarks."""
 
+TINT = Scene(
+    base=150.0,
+    contrast=-10.0,
+    ripple=22,
+    scallop_mm=0.08,
+    dark_toe=30,
+    texture=4,
+    noise=2,
+    tint_mm=6,
+)
+"""A bead inside its heat tint: an oxide film `tint_nm` thick that ends `tint_mm` from the toes."""
+
 
 @dataclass(frozen=True, slots=True)
 class SyntheticBead:
-    """A rendered photo (uint8, rows x columns) and its truth.
+    """A rendered photo (uint8, rows x columns, B, G, R too with a heat tint) and its truth.
 
     The seam is sampled densely: `x_mm`, `y_mm`, arc length `s_mm`, half widths `left_mm` (towards
     smaller y) and `right_mm`. `gaps_mm` holds the intervals of s without bead.
@@ -188,6 +211,8 @@ def render(scene: Scene, seed: int = 0) -> SyntheticBead:
     picture += plate * brushed(rng, picture.shape, scene.texture)
     spatter_discs(rng, picture, scene.spatter, seam.locate, matrix, scene.mm_per_px, left, right)
     picture *= _gradient(scene)
+    if scene.tint_mm:
+        picture = picture[..., None] * _tint(scene, seam, surface, matrix)
     blurred = cv2.GaussianBlur(picture, (0, 0), scene.blur_px) if scene.blur_px else picture
     picture = blurred + scene.noise * rng.standard_normal(picture.shape)
     calibration = PlaneCalibration(
@@ -206,6 +231,18 @@ def _gradient(scene: Scene) -> Floats:
     x = np.arange(scene.width_px) / scene.width_px - 0.5
     y = np.arange(scene.height_px) / scene.height_px
     return 1.0 + scene.gradient * (x[None, :] + 0.6 * y[:, None])
+
+
+def _tint(
+    scene: Scene, seam: _Seam, surface: Surface, matrix: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Part of the light that each pixel keeps in B, G, R; the film covers the bead as well."""
+    columns, rows = np.meshgrid(np.arange(scene.width_px) * 1.0, np.arange(scene.height_px) * 1.0)
+    x, y, w = (row[0] * columns + row[1] * rows + row[2] for row in matrix)
+    s, offset = seam.locate((x / w).ravel(), (y / w).ravel())
+    outside = np.abs(offset) - surface.half_width(s, offset)
+    thick = film_nm(outside, scene.tint_mm, scene.tint_nm)
+    return film_colour(thick).reshape(scene.height_px, scene.width_px, 3)
 
 
 def _sample(

@@ -6,8 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
+from scipy.special import erfc
 
 Floats = NDArray[np.float64]
+
+_WAVELENGTHS_NM = (450.0, 540.0, 610.0)
+"""Of blue, green and red light."""
+_FILM_INDEX = 2.3
+"""Refractive index of an oxide film on steel."""
+_FILM_DEPTH = 0.55
+"""Part of the light that destructive interference takes."""
 
 
 def smooth_noise(rng: np.random.Generator, count: int, correlation: float) -> Floats:
@@ -50,17 +58,18 @@ class Surface:
 
     def grey(self, s: Floats, offset: Floats) -> tuple[Floats, Floats]:
         """Grey level at places (s, signed offset), and 1.0 where there is plate."""
-        half = np.where(
-            offset < 0,
-            np.interp(s, self.seam_s_mm, self.left_mm),
-            np.interp(s, self.seam_s_mm, self.right_mm),
-        )
+        half = self.half_width(s, offset)
         on_bead = np.abs(offset) < half
         for first, last in self.gaps_mm:
             on_bead &= ~((s >= first) & (s < last))
         value = self._plate(np.abs(offset) - half)
         value[on_bead] = self._bead(s[on_bead], (offset / half)[on_bead], half[on_bead])
         return value, np.where(on_bead, 0.0, 1.0)
+
+    def half_width(self, s: Floats, offset: Floats) -> Floats:
+        """Half width on the side of `offset`."""
+        left = np.interp(s, self.seam_s_mm, self.left_mm)
+        return np.where(offset < 0, left, np.interp(s, self.seam_s_mm, self.right_mm))
 
     def _plate(self, outside: Floats) -> Floats:
         value = np.full(outside.shape, self.base)
@@ -82,6 +91,17 @@ class Surface:
             strength = np.interp(s, self.seam_s_mm, self.line[1])
             value += 160 * self.specular * strength * np.exp(-0.5 * ((u - place) / 0.10) ** 2)
         return value
+
+
+def film_nm(outside_mm: Floats, reach_mm: float, thickest_nm: float) -> Floats:
+    """Thickness of the oxide film at a distance from the toe: it fades out around `reach_mm`."""
+    return np.asarray(0.5 * thickest_nm * erfc((outside_mm - reach_mm) / (0.3 * reach_mm)))
+
+
+def film_colour(thick_nm: Floats) -> Floats:
+    """Part of the light reflected in B, G, R: two-beam interference in the film, shape (..., 3)."""
+    phase = 4 * np.pi * _FILM_INDEX * thick_nm[..., None] / np.array(_WAVELENGTHS_NM)
+    return np.asarray(1.0 - _FILM_DEPTH * (1.0 - np.cos(phase)) / 2)
 
 
 def spatter_discs(

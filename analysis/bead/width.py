@@ -30,6 +30,7 @@ class BandEvidence:
     rival: float
     inner: float
     nested: bool
+    sharper: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +186,7 @@ def _evidence(
         rival=band.rival,
         inner=band.inner,
         nested=band.nested,
+        sharper=band.sharper,
         step_grey=min(float(np.median(np.abs(toe.height))) for toe in toes),
         lengths=length / typical,
         width_px=typical / step,

@@ -1,6 +1,7 @@
 """Photos without a bead to measure: refused or doubted, never a width to trust."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from seamlog.analysis.bead.image import make_photo
 from seamlog.analysis.bead.plane import plane_of
 from seamlog.analysis.bead.strip import measure_strip
-from seamlog.analysis.bead.synthetic import CASES, render
+from seamlog.analysis.bead.synthetic import CASES, TINT, Scene, render
 from seamlog.analysis.bead.synthetic_surface import brushed
 from seamlog.errors import EvidenceError, ImageError
 
@@ -104,6 +105,27 @@ def test_two_beads_are_doubted() -> None:
     result = measure_strip(photo, plane_of(photo, None))
     assert not result.trusted
     assert any("another band" in warning for warning in result.warnings)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        replace(TINT, tint_mm=9, contrast=-40, ripple=3, specular=1.0),
+        replace(TINT, blur_px=2.5),
+        replace(TINT, tint_mm=3),
+        replace(TINT, contrast=0, ripple=0),
+    ],
+    ids=["specular", "out of focus", "narrow tint", "smooth bead"],
+)
+def test_a_heat_tint_is_never_trusted_as_the_bead(scene: Scene) -> None:
+    photo = make_photo(render(scene, 0).pixels, "tint.png")
+    try:
+        result = measure_strip(photo, plane_of(photo, None))
+    except EvidenceError as error:
+        assert "heat tint" in str(error)
+    else:
+        assert not result.trusted
+        assert any("heat tint" in warning for warning in result.warnings)
 
 
 def test_a_path_outside_the_photo_is_refused() -> None:

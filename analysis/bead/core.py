@@ -1,0 +1,79 @@
+"""Inside a band: what is sharper there than the band's own toes.
+
+Something sharp inside shows that the photo is in focus, so toes that are soft in it are soft in
+truth: the fading end of a heat tint rather than the toes of a bead.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .band import BandSearch
+from .curve import fit_centreline
+from .features import smoothed, strip_features
+from .image import Photo
+from .plane import Plane, Points
+from .refine import projection
+from .sampling import Strip, sample_strip
+from .toes import Extent
+from .width import Toes
+
+Floats = NDArray[np.float64]
+
+_COLUMNS = 60
+"""Columns of half the band in the strip that is searched."""
+_INSIDE = 0.85
+"""Part of the half width that is searched: the toes themselves lie outside."""
+_MIDDLE = 0.3
+"""Heat spreads alike to both sides: a bead lies this near (half widths) to its tint's middle."""
+_ALONG = 3
+"""Rows per section."""
+
+
+def band_inside(
+    photo: Photo, plane: Plane, middle: Points, half: float, unit: float
+) -> tuple[Points, float] | None:
+    """Path and half width of the most evident band well inside another, as if that were plate.
+
+    `middle` (n, 2), `half` and `unit` (length of a px) are in the plane's unit.
+    """
+    step = max(unit, half / _COLUMNS)
+    line = fit_centreline(middle, 2 * step, 4 * half)
+    strip = sample_strip(photo, plane, line, _INSIDE * half, step, blur=step / unit)
+    sections = smoothed(strip_features(strip.opponent, 2.0), 0, float(_ALONG))[::_ALONG]
+    columns = sections.shape[1]
+    central = np.abs(np.arange(columns + 1) - columns / 2) * step < _MIDDLE * half
+    search = BandSearch(sections, 0.12 * columns, 0.65 * columns)
+    band = search.best(central.astype(np.float32))
+    if band is None or band.last - band.first < 2:
+        return None
+    rows = (np.arange(band.first, band.last + 1) * _ALONG).clip(0, len(line.s) - 1)
+    offsets = strip.offset((band.left + band.right) / 2 - 0.5)
+    points = line.points[rows] + offsets[:, None] * line.normals[rows]
+    return points, float(np.median(band.right - band.left)) / 2 * step
+
+
+def softness(strip: Strip, extent: Extent, toes: tuple[Toes, Toes]) -> tuple[float, float]:
+    """Columns that the change at each toe would take at its steepest: left, right.
+
+    The median over the rows; a change without an end within a fifth of the half width counts as
+    far as that.
+    """
+    smooth = smoothed(strip.opponent, 0, 4.0)
+    reach = int(max(6, 0.2 * float(np.median(extent.half))))
+    sides = []
+    for side, edge, toe in ((-1, extent.left, toes[0]), (1, extent.right, toes[1])):
+        signal, _ = projection(smooth, strip.valid, edge, side, extent)
+        sides.append(_columns_of_change(signal, strip.column(toe.offset), reach))
+    return sides[0], sides[1]
+
+
+def _columns_of_change(signal: NDArray[np.float32], edge: Floats, reach: int) -> float:
+    calm = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.0, sigmaY=0.01)
+    around = np.rint(edge).astype(int)[:, None] + np.arange(-reach, reach + 1)
+    columns = np.clip(around, 0, calm.shape[1] - 1)
+    profile = calm[np.arange(len(edge))[:, None], columns]
+    level = max(2, reach // 4)
+    change = np.abs(profile[:, :level].mean(axis=1) - profile[:, -level:].mean(axis=1))
+    steepest = np.abs(np.gradient(profile, axis=1)).max(axis=1)
+    return float(np.median(change / np.maximum(steepest, 1e-3)))
