@@ -16,6 +16,8 @@ from .friction_models import FloatArray
 from .servo import Servo
 
 Step = Callable[[float, float], float]
+_START_ROWS = 3
+_AT_REST_M_S = 1e-3
 
 
 @dataclass(frozen=True)
@@ -122,8 +124,9 @@ def simulate_servo(
     """The drive's law and the axis in closed loop along the recorded reference."""
     period, step, scale = record.period_s, make_step(axis, record.period_s), record.drive.scale
     outer, inner, window = servo.position_gain_1_s, servo.velocity_gain, servo.window
-    x, v = float(record.position_m[0]), 0.0
-    passed, last = [x] * window, float(record.command[0])
+    x, v = _start(record)
+    passed = [x - back * period * v for back in range(window, 0, -1)]
+    last = float(record.command[0])
     rows = []
     for k, wanted in enumerate(record.reference_m.tolist()):
         seen = (x - passed[k]) / (window * period)
@@ -135,3 +138,11 @@ def simulate_servo(
         v, last = after, command
     columns = np.array(rows).T
     return ServoRun(columns[0], columns[1], columns[2])
+
+
+def _start(record: AxisRecord) -> tuple[float, float]:
+    """Position and speed of the first sample; below _AT_REST_M_S it rests."""
+    x = record.position_m[:_START_ROWS]
+    after_s = record.period_s * np.arange(len(x))
+    speed = float(np.polynomial.Polynomial.fit(after_s, x, 2).deriv()(0.0))
+    return float(x[0]), speed if abs(speed) > _AT_REST_M_S else 0.0

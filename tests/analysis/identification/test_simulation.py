@@ -30,7 +30,8 @@ VALUES = np.array([90.0, 200.0, 20.0, -3.0])
 def servo_record(noise_m: float = 0.0, seconds: float = 8.0) -> AxisRecord:
     """The drive's law on the true axis; `noise_m` is added to the recorded positions."""
     time = PERIOD_S * np.arange(round(seconds / PERIOD_S))
-    reference = 0.1 * np.sin(1.7 * time) + 0.02 * np.sin(7.0 * time)
+    soft = 1 - np.exp(-((time / 0.5) ** 3))
+    reference = soft * (0.1 * np.sin(1.7 * time) + 0.02 * np.sin(7.0 * time))
     stamp_ns = 2_000_000 * np.arange(len(time))
     none = np.full(len(time), np.nan)
     blank = AxisRecord(
@@ -82,6 +83,14 @@ def test_the_law_is_told_exactly(clean: AxisRecord) -> None:
 
 def test_the_axis_under_its_own_commands_goes_where_it_went(clean: AxisRecord) -> None:
     np.testing.assert_allclose(simulate_commands(clean, TRUTH, 0.0), clean.position_m, atol=1e-9)
+
+
+def test_a_record_that_begins_in_motion_is_followed(clean: AxisRecord) -> None:
+    """The stretch after a gap begins anywhere in the motion."""
+    late = clean.rows(slice(1500, None))
+    run = simulate_servo(late, TRUTH, LAW, 0.0)
+    assert np.abs(np.diff(late.position_m[:2])).item() > 1e-5
+    np.testing.assert_allclose(run.position_m, late.position_m, atol=2e-5)
 
 
 def test_an_axis_at_rest_holds_until_friction_breaks(clean: AxisRecord) -> None:
