@@ -9,10 +9,9 @@ from pydantic import BaseModel, ValidationError
 from seamlog import plugins
 from seamlog.analysis.controllers.guard import make_guarded
 from seamlog.analysis.controllers.own import config_of, is_own, load_own, own_class_name
+from seamlog.analysis.estimators.guard import make_guarded_estimator
 from seamlog.contracts import Axis, Controller, Estimator
 from seamlog.errors import ConfigError, UsageError
-
-from .guard import make_guarded_estimator
 
 
 @dataclass(frozen=True)

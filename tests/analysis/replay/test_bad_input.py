@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from seamlog.analysis.estimators.guard import make_guarded_estimator
 from seamlog.analysis.replay.figures import UNSTABLE
-from seamlog.analysis.replay.guard import make_guarded_estimator
 from seamlog.analysis.replay.inputs import replay_inputs
 from seamlog.analysis.replay.shadow import shadow_estimator
 from seamlog.cli import run
