@@ -7,8 +7,6 @@ from typing import Any
 
 import click
 
-JSON = "seamlog.json"
-
 
 class Command(click.Command):
     """A command with `--json`; its function returns an `Outcome` that `seamlog.cli` prints."""
@@ -20,16 +18,9 @@ class Command(click.Command):
                 ["--json"],
                 is_flag=True,
                 expose_value=False,
-                is_eager=True,
-                callback=_remember_json,
                 help="Print one JSON document on stdout.",
             )
         )
-
-
-def _remember_json(context: click.Context, _: click.Parameter, value: bool) -> None:
-    if value:
-        context.meta[JSON] = True
 
 
 class Group(click.Group):

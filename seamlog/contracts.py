@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
 from seamlog.clock import Clock
 
@@ -143,9 +142,3 @@ class Importer(Protocol):
     def load(self, path: Path) -> Mapping[str, NDArray[Any]]:
         """One-dimensional arrays (or scalars of shape ()) by their name in the file."""
         ...
-
-
-class Configured(Protocol):
-    """A factory that carries the model of its configuration."""
-
-    Config: type[BaseModel]

@@ -10,7 +10,6 @@ class Limits:
     chunk_bytes: int = 256 << 20
     """Decompressed size of one chunk; counted while decompressing."""
     message_bytes: int = 64 << 20
-    string_bytes: int = 16 << 20
     attachment_bytes: int = 512 << 20
     image_pixels: int = 120_000_000
     """Width times height, taken from the picture's header before it is decoded."""

@@ -40,7 +40,7 @@ def write_replay(found: Replay, session: "Session", path: Path, force: bool) -> 
 
 class _Outputs:
     def __init__(self, writer: BatchWriter, found: Replay, drive: dict[str, str]) -> None:
-        self._writer, self._record, self._live = writer, found.record, found.live
+        self._writer, self._record = writer, found.record
         self._drive = {k: v for k, v in drive.items() if k not in ("absent", "producer")}
 
     def _write(
