@@ -19,9 +19,12 @@ from seamlog.errors import (
 from seamlog.outcome import Ending, Outcome
 
 COMMANDS: dict[str, tuple[str, str]] = {
-    "record": ("seamlog.recorder.commands:record", "Record a live source into a session."),
-    "sources": ("seamlog.recorder.commands:sources", "List the sources that can be recorded."),
-    "import": ("seamlog.recorder.commands:import_", "Turn a foreign log into a session."),
+    "record": ("seamlog.recorder.commands.record:record", "Record a live source into a session."),
+    "sources": (
+        "seamlog.recorder.commands.sources:sources",
+        "List and probe what can be recorded.",
+    ),
+    "import": ("seamlog.recorder.importers.command:import_", "Turn a foreign log into a session."),
     "info": ("seamlog.commands.info:info", "Say what is in a session."),
     "attach": ("seamlog.commands.attach:attach", "Put photos, procedures, calibrations in."),
     "identify": ("seamlog.analysis.commands.identify:identify", "Find inertia and friction."),

@@ -1,0 +1,1 @@
+"""Commands of the live side, one module each."""

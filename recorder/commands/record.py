@@ -1,0 +1,56 @@
+"""`seamlog record`: a live source into a session."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from seamlog import plugins
+from seamlog.command import command, config_options, force_option, output_option
+from seamlog.errors import UsageError
+from seamlog.outcome import Outcome
+
+from .record_outcome import record_outcome
+
+
+@command()
+@click.option("--source", "name", required=True, help="A source that 'seamlog sources' lists.")
+@output_option("The session to write, such as weld.mcap.")
+@config_options
+@click.option("--meta", multiple=True, metavar="KEY=VALUE", help="Into the session's metadata.")
+@click.option("--pace", type=click.Choice(["realtime"]), help="Hold a simulated source to time.")
+@click.option("--duration", type=click.FloatRange(min=0, min_open=True), help="End after S s.")
+@force_option
+def record(
+    name: str,
+    output: Path,
+    config: Path | None,
+    settings: tuple[str, ...],
+    meta: tuple[str, ...],
+    pace: str | None,
+    duration: float | None,
+    force: bool,
+) -> Outcome:
+    """Record a live source into a session; Ctrl-C ends the recording and finishes the file."""
+    from seamlog.config import load_config
+    from seamlog.files import check_output
+
+    values = _read_meta(meta)
+    factory = plugins.load("seamlog.sources", name)
+    check_output(output, force)
+    source = factory(load_config(factory.Config, "source", config, settings))
+
+    from seamlog.recorder.session_run import run_source
+
+    run = run_source(source, output, values, pace == "realtime", duration, force)
+    return record_outcome(run, output)
+
+
+def _read_meta(pairs: Sequence[str]) -> dict[str, str]:
+    found = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or not key.strip():
+            raise UsageError(f"--meta {pair!r}: write it as key=value")
+        found[key.strip()] = value
+    return found
