@@ -77,7 +77,7 @@ def torch_path(session: "Session", weld: "Weld") -> TorchPath:
             f"{2 * _FEWEST} are needed; record the marker at 10 Hz"
         )
     pixels = np.column_stack([marker["x_px"][chosen][row], marker["y_px"][chosen][row]])
-    fixed_mm = _plane_mm(calibration, pixels)
+    fixed_mm = calibration.plane_mm(pixels)
     plate_mm = fixed_mm - _table_mm(session.columns(ENCODER), stamp_ns)
     return path_of(stamp_ns, plate_mm, (start_ns, end_ns), calibration.scale_relative_u)
 
@@ -176,11 +176,6 @@ def _calibration(session: "Session") -> PlaneCalibration:
     if not isinstance(found, PlaneCalibration):
         raise EvidenceError(f"{session.path}: {CALIBRATION} is a scale, a plane is needed")
     return found
-
-
-def _plane_mm(calibration: PlaneCalibration, pixels: FloatArray) -> FloatArray:
-    raised = np.column_stack([pixels, np.ones(len(pixels))]) @ calibration.matrix().T
-    return np.asarray(raised[:, :2] / raised[:, 2:])
 
 
 def _table_mm(encoder: Mapping[str, NDArray[Any]], stamp_ns: NDArray[np.int64]) -> FloatArray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.calibration import Calibration, PlaneCalibration
+from seamlog.calibration import Calibration, Lens, PlaneCalibration, projected
 from seamlog.errors import CalibrationError
 
 from .image import Photo
@@ -15,7 +15,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """Homography between photo pixels and the measuring plane.
+    """Homography between photo pixels, freed from the lens's distortion, and the measuring plane.
 
     `unit` is `mm` or `px`; `scale_relative_u` the relative standard uncertainty of a length;
     `residual` the rms distance of the calibration points, in `unit`.
@@ -26,17 +26,27 @@ class Plane:
     scale_relative_u: float
     residual: float
     in_table_frame: bool = False
+    lens: Lens | None = None
 
     def to_plane(self, points_px: Points) -> Points:
         """Plane coordinates of photo points, shape (n, 2)."""
-        return _project(self.plane_from_px, points_px)
+        ideal = self.lens.straightened(points_px) if self.lens else points_px
+        return projected(self.plane_from_px, ideal)
 
     def to_px(self, points: Points) -> Points:
         """Photo pixels of plane points, shape (n, 2)."""
-        return _project(self.px_from_plane(), points)
+        ideal = projected(self.px_from_plane(), points)
+        return self.lens.distorted(ideal) if self.lens else ideal
+
+    def through_lens(self, x: Points, y: Points) -> tuple[Points, Points]:
+        """Photo pixels of what an ideal lens would show at x, y (arrays of one shape)."""
+        if self.lens is None:
+            return x, y
+        bent = self.lens.distorted(np.stack([x, y], axis=-1))
+        return bent[..., 0], bent[..., 1]
 
     def px_from_plane(self) -> NDArray[np.float64]:
-        """The inverse homography, shape (3, 3)."""
+        """The inverse homography, shape (3, 3), to pixels freed from the lens's distortion."""
         return np.asarray(np.linalg.inv(self.plane_from_px), dtype=np.float64)
 
     def unit_per_px(self, points_px: Points) -> float:
@@ -46,11 +56,6 @@ class Plane:
         down = self.to_plane(points_px + half_y) - self.to_plane(points_px - half_y)
         area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
         return float(np.sqrt(np.median(area)))
-
-
-def _project(matrix: NDArray[np.float64], points: Points) -> Points:
-    homogeneous = points @ matrix[:, :2].T + matrix[:, 2]
-    return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:])
 
 
 def plane_of(photo: Photo, calibration: Calibration | None) -> Plane:
@@ -73,6 +78,7 @@ def plane_of(photo: Photo, calibration: Calibration | None) -> Plane:
             calibration.scale_relative_u,
             calibration.residual_mm,
             calibration.frame == "table",
+            calibration.lens,
         )
     scale = calibration.mm_per_px
     return Plane(np.diag([scale, scale, 1.0]), "mm", calibration.scale_relative_u, 0.0)

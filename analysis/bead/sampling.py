@@ -77,4 +77,4 @@ def _maps(
     base = line.points @ matrix[:, :2].T + matrix[:, 2]
     slope = line.normals @ matrix[:, :2].T
     x, y, w = (base[:, k, None] + slope[:, k, None] * offsets for k in range(3))
-    return x / w, y / w
+    return plane.through_lens(x / w, y / w)

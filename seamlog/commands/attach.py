@@ -83,9 +83,9 @@ def read_attachment_file(path: Path, kind: str | None) -> "Attachment":
     if kind == "photo" or path.suffix.lower() in _PICTURES:
         media_type = check_picture(data, str(path)).media_type
     if kind == "calibration" and path.suffix.lower() == ".json":
-        from seamlog.calibration import parse_calibration
+        from seamlog.calibration import parse_any_calibration
 
-        parse_calibration(data, str(path))
+        parse_any_calibration(data, str(path))
     name = f"{kind}/{_sanitised(path.name)}"
     return Attachment(name, media_type, time.time_ns(), data, path.stat().st_mtime_ns)
 
