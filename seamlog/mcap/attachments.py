@@ -1,8 +1,9 @@
 """Attachments (photos, procedures, calibrations) and metadata records, read when asked for."""
 
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+
+from zlib_ng.zlib_ng import crc32
 
 from seamlog.errors import LimitExceeded, SessionError, UnknownName
 from seamlog.limits import Limits
@@ -45,7 +46,7 @@ def _parsed(content: memoryview) -> Attachment:
     data = cursor.take(cursor.u64())
     end = cursor.at
     stored = cursor.u32()
-    if stored and zlib.crc32(content[:end]) != stored:
+    if stored and crc32(content[:end]) != stored:
         raise Malformed("its CRC is wrong")
     return Attachment(name, media_type, log_time, bytes(data), create_time)
 

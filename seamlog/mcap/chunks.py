@@ -1,7 +1,8 @@
 """Reads one chunk: head against index, bytes counted while decompressing, CRC."""
 
 import struct
-import zlib
+
+from zlib_ng.zlib_ng import crc32
 
 from seamlog.limits import Limits
 from seamlog.mcap import records
@@ -38,6 +39,6 @@ def _unpacked(source: FileSource, entry: ChunkEntry, limits: Limits) -> memoryvi
     if data[at + _HEAD.size : start - 8] != name:
         raise Malformed("its compression is not what the index says")
     unpacked = decompress(data[start:end], entry.compression, size, limits.chunk_bytes)
-    if crc and zlib.crc32(unpacked) != crc:
+    if crc and crc32(unpacked) != crc:
         raise Malformed("its CRC is wrong")
     return memoryview(unpacked)

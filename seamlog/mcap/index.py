@@ -1,8 +1,9 @@
 """What is in an MCAP file and where, from its summary, else from a walk over the records."""
 
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+
+from zlib_ng.zlib_ng import crc32
 
 from seamlog.errors import SessionError
 from seamlog.limits import LIMITS, Limits
@@ -125,7 +126,7 @@ def _read_summary(source: FileSource, start: int, index: FileIndex, limits: Limi
         raise Malformed(f"{end - start} bytes are more than summary_bytes = {limits.summary_bytes}")
     data = source.data
     stored = parsing.Cursor(data, source.size - len(records.MAGIC) - 4).u32()
-    if stored and zlib.crc32(data[start : source.size - len(records.MAGIC) - 4]) != stored:
+    if stored and crc32(data[start : source.size - len(records.MAGIC) - 4]) != stored:
         raise Malformed("its CRC is wrong")
     for opcode, offset, length in walk(data, start, end):
         index.learn(opcode, data[offset + records.RECORD_HEAD.size : offset + length])

@@ -7,12 +7,12 @@ there is a valid prefix, and the caller may truncate the file to it and go on el
 
 import os
 import struct
-import zlib
 from collections.abc import Mapping, Sequence
 from typing import IO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from zlib_ng.zlib_ng import crc32
 
 from seamlog.mcap import records
 from seamlog.mcap.compression import compress
@@ -143,7 +143,7 @@ class FileWriter:
         head, data = parts
         body = compress(_joined(head, data, compression), compression)
         pieces = [head, body] if head and not compression else [body]
-        crc = zlib.crc32(data, zlib.crc32(head))
+        crc = crc32(data, crc32(head))
         size, stored = len(head) + len(data), sum(len(piece) for piece in pieces)
         start = min(int(times.min()) for times, _ in indexes.values())
         end = max(int(times.max()) for times, _ in indexes.values())
@@ -190,7 +190,7 @@ class FileWriter:
         head = struct.pack("<QQ", log_time_ns, create_time_ns)
         head += records.pack_string(name) + records.pack_string(media_type)
         head += struct.pack("<Q", size)
-        crc = struct.pack("<I", zlib.crc32(data, zlib.crc32(head)))
+        crc = struct.pack("<I", crc32(data, crc32(head)))
         front = records.RECORD_HEAD.pack(records.ATTACHMENT, len(head) + size + 4)
         at = self._size
         self._write([front, head, data, crc])
@@ -210,7 +210,7 @@ class FileWriter:
         body, offsets = records.groups(self._summary(), start)
         foot = records.footer(start if body else 0, start + len(body) if offsets else 0)
         summary = body + offsets + foot
-        crc = struct.pack("<I", zlib.crc32(summary))
+        crc = struct.pack("<I", crc32(summary))
         self._write([data_end, summary, crc, records.MAGIC])
 
     def _summary(self) -> Sequence[tuple[int, Sequence[bytes]]]:
