@@ -6,13 +6,15 @@ if TYPE_CHECKING:
     from .accounts import Account, Status
     from .channel import Channel
     from .recorder import Recorder
+    from .storage import Storage
 
-__all__ = ["Account", "Channel", "Recorder", "Status"]
+__all__ = ["Account", "Channel", "Recorder", "Status", "Storage"]
 _HOMES = {
     "Account": "accounts",
     "Channel": "channel",
     "Recorder": "recorder",
     "Status": "accounts",
+    "Storage": "storage",
 }
 
 

@@ -20,13 +20,18 @@ from .ring import (
     WRITTEN,
     Ring,
 )
+from .storage import SYNC_S, SyncPolicy
 
-ACKNOWLEDGEMENT = (
-    ("accepted", "put returned True: survives the death of the live loop"),
-    ("flushed", "handed to the system, within 0.1 s: survives the death of the recorder too"),
-    ("durable", "synced, within 0.35 s, at once on arc off and faults: survives loss of power"),
-)
-"""What each level of acknowledgement survives."""
+
+def acknowledgement(sync: SyncPolicy) -> dict[str, str]:
+    """What each level of acknowledgement survives, and when it is reached."""
+    within_s = 0.1 + SYNC_S[sync]
+    return {
+        "accepted": "put returned True: survives the death of the live loop",
+        "flushed": "handed to the system, within 0.1 s: survives the death of the recorder too",
+        "durable": f"synced, within {within_s:.2g} s and the disk's own time, at once on arc off "
+        "and faults: survives loss of power",
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +77,9 @@ class Status:
     """The recorder process lives and takes messages."""
     channels: tuple[Account, ...]
     findings: tuple[str, ...]
+    files: tuple[str, ...] = ()
+    """The session's files at the end, in order; one unless it was long or a disk failed."""
+    sync: SyncPolicy = "default"
 
     @property
     def is_complete(self) -> bool:

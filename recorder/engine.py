@@ -2,7 +2,8 @@
 
 import shutil
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,15 +13,17 @@ from .feeds import Feed
 from .folder import Recording
 from .intake import Intake
 from .journal import Journal
-from .mcap_writer import SessionFile
+from .mcap_writer import SessionFile, written_files
 from .ring import DROPPED, LAST_SYNC_NS
-from .syncing import Syncer
+from .storage import SYNC_S
 from .varying_feed import VaryingFeed
 
-_SYNC_S = 0.25
 _STATUS_S = 1.0
 _CLOCK_STEP_NS = 100_000_000
 _RETRY_S = 0.1
+_SPACE_FOR_S = 120.0
+"""The disk is nearly full when it has room for less than this at the present rate."""
+_MOST_FINDINGS = 100
 _LAST_TRIES_S = 2.0
 """How long writing is tried again after the loop has ended."""
 
@@ -28,22 +31,33 @@ _LAST_TRIES_S = 2.0
 class Engine:
     """Owns the session file from the first byte to its name."""
 
-    def __init__(self, recording: Recording, folder: Path, descriptor: int) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        folder: Path,
+        descriptor: int,
+        say: Callable[[Mapping[str, str]], None] = lambda _: None,
+    ) -> None:
         self._recording = recording
         self._folder = folder
-        self._file = SessionFile(recording, folder, descriptor)
+        self._say = say
+        self._findings: list[str] = []
+        self._notes: deque[tuple[str, str]] = deque()
+        self._file = SessionFile(recording, folder, descriptor, self._fault, self._log_time_ns)
         self._journal = Journal(self._file)
         self._intake = Intake(folder, self._file)
+        self._file.farewell = self._write_all_accounts
+        self._sync_every_s = SYNC_S[recording.storage.sync]
         self._synced_s = self._status_s = time.monotonic()
         self._retry_s = 0.0
+        self._failures = 0
         self._asked_size = 0
-        self._syncer = Syncer(self._file.descriptor)
-        self._is_durable = True
         self._last_sync_ns = 0
         self._step_ns = self._wall_step_ns()
         self._dropped: dict[int, int] = {}
         self._explained: set[int] = set()
-        self._findings: list[str] = []
+        self._sizes: deque[tuple[float, int]] = deque(maxlen=30)
+        self._has_warned = self._has_stopped = False
 
     def step(self) -> bool:
         """Do what is due now; True if there is more to do at once."""
@@ -51,11 +65,14 @@ class Engine:
         if now_s < self._retry_s:
             return False
         try:
-            return self._step(now_s)
+            busy = self._step(now_s)
         except OSError as error:
-            self._find(f"writing failed and is tried again: {error}")
+            # What could not be written is still in the rings.
+            self._note_failure(error)
             self._retry_s = now_s + _RETRY_S
             return False
+        self._failures = 0
+        return busy
 
     def finish(self, ending: str) -> dict[str, Any]:
         """Write what is left, the final accounts and the footer; the accounts as a document.
@@ -64,20 +81,20 @@ class Engine:
         """
         try:
             self._persist(self._drain)
-            self._syncer.end()
-            self._sync_all()
             self._persist(lambda: self._sign(ending))
-            self._persist(self._file.finish)
-            self._sync_all()
-            self._take_name()
-            shutil.rmtree(self._folder, ignore_errors=True)
+            is_whole = True
         except OSError as error:
-            where = f"{self._recording.partial} is unfinished; the rest is in {self._folder}"
-            self._find(f"the file could not be finished: {error}; {where}")
-        self._file.close()
+            is_whole = False
+            self._find(f"not all could be written: {error}; the rest is in {self._folder}")
+        for trouble in self._file.finish():
+            self._find(trouble)
+        self._note_sync()
+        if is_whole:
+            shutil.rmtree(self._folder, ignore_errors=True)
         return {
             "channels": [account_document(row) for row in self._accounts()],
             "findings": self._findings,
+            "files": written_files(self._file),
         }
 
     def _step(self, now_s: float) -> bool:
@@ -87,12 +104,16 @@ class Engine:
         if urgent:
             self._pump(now_s, flush=True)
         self._sync(now_s, at_once=bool(urgent))
+        self._write_notes()
         self._note_gaps()
         if self._recording.anchor_ns is not None:
             self._watch_clock()
         if now_s - self._status_s >= _STATUS_S and self._recording.pace == "paced":
             self._status_s = now_s
             self._write_status(self._accounts())
+            self._watch_space(now_s)
+        if self._file.is_over_budget and not self._has_stopped:
+            self._stop()
         return busy
 
     def _pump(self, now_s: float, flush: bool) -> bool:
@@ -104,21 +125,55 @@ class Engine:
 
     def _sync(self, now_s: float, at_once: bool) -> None:
         """Ask for a sync if one is due, and take note of the one that is done."""
-        due = at_once or now_s - self._synced_s >= _SYNC_S
-        if due and self._file.size != self._asked_size and self._is_durable:
+        due = at_once or now_s - self._synced_s >= self._sync_every_s
+        if due and self._file.size != self._asked_size:
             self._synced_s, self._asked_size = now_s, self._file.size
-            self._syncer.request(self._log_time_ns())
-        if self._syncer.error and self._is_durable:
-            self._is_durable = False
-            self._find(f"a sync failed, nothing is durable from here on: {self._syncer.error}")
-            self._journal.event("FAULT", self._findings[-1], self._log_time_ns())
-        self._note_sync(self._syncer.done_mark)
+            self._file.request_sync()
+        for trouble in self._file.watch():
+            self._fault(trouble)
+        self._note_sync()
 
-    def _note_sync(self, time_ns: int) -> None:
-        if time_ns > self._last_sync_ns:
-            self._last_sync_ns = time_ns
+    def _note_sync(self) -> None:
+        if self._file.done_mark > self._last_sync_ns:
+            self._last_sync_ns = self._file.done_mark
             for feed in self._intake.feeds:
-                feed.ring.words[LAST_SYNC_NS] = time_ns
+                feed.ring.words[LAST_SYNC_NS] = self._last_sync_ns
+
+    def _fault(self, finding: str) -> None:
+        """Something is wrong with the files: tell the loop now, the log when it can be written."""
+        if self._find(finding):
+            self._notes.append(("FAULT", finding))
+
+    def _note_failure(self, error: OSError) -> None:
+        """The file has told of the first failure in a row itself."""
+        self._failures += 1
+        if self._failures > 1:
+            self._fault(f"writing fails and is tried again: {error}")
+
+    def _write_notes(self) -> None:
+        while self._notes:
+            kind, detail = self._notes[0]
+            self._journal.event(kind, detail, self._log_time_ns())
+            self._notes.popleft()
+
+    def _watch_space(self, now_s: float) -> None:
+        """Warn once while there is still time to make room."""
+        self._sizes.append((now_s, self._file.size))
+        (first_s, first_bytes), free = self._sizes[0], self._file.free_bytes()
+        rate = (self._file.size - first_bytes) / max(now_s - first_s, 1.0)
+        if free < rate * _SPACE_FOR_S and not self._has_warned:
+            self._has_warned = True
+            left = f"{free / 2**20:.0f} MiB are free, enough for {free / rate:.0f} s"
+            self._say({"warning": f"the disk is nearly full: {left}"})
+            self._notes.append(("NOTE", f"the disk is nearly full: {left}"))
+
+    def _stop(self) -> None:
+        """The budget is used up: the loop is to take nothing more, what it has is written."""
+        self._has_stopped = True
+        budget = (self._recording.storage.budget_bytes or 0) / 2**20
+        reason = f"the disk budget of {budget:.0f} MiB is used up, the recording has stopped"
+        self._fault(reason)
+        self._say({"stop": reason})
 
     def _note_gaps(self) -> None:
         """Accounts at the start of each run of drops, and the first reason of a channel."""
@@ -130,6 +185,10 @@ class Engine:
             self._dropped[feed.channel_id] = dropped
             self._explain(feed)
         if rows:
+            self._write_status(rows)
+
+    def _write_all_accounts(self) -> None:
+        if rows := self._accounts():
             self._write_status(rows)
 
     def _explain(self, feed: Feed) -> None:
@@ -177,44 +236,28 @@ class Engine:
             try:
                 return act()
             except OSError as error:
+                self._note_failure(error)
                 if time.monotonic() > deadline_s:
                     raise
-                self._find(f"writing failed and is tried again: {error}")
                 time.sleep(_RETRY_S)
-
-    def _sync_all(self) -> None:
-        """Sync and wait for it."""
-        if not self._is_durable:
-            return
-        try:
-            self._file.sync()
-            self._note_sync(self._log_time_ns())
-        except OSError as error:
-            self._is_durable = False
-            self._find(f"the last sync failed, the file may not survive a loss of power: {error}")
 
     def _drain(self) -> None:
         self._intake.take()
         self._pump(time.monotonic(), flush=True)
 
     def _sign(self, ending: str) -> None:
-        """The last words of the recorder: accounts and why it ended."""
+        """The last words of the recorder: why it ended; the file adds the accounts."""
         self._note_gaps()
-        rows = self._accounts()
-        if rows:
-            self._write_status(rows)
+        self._write_notes()
         self._file.add_metadata("seamlog.recording.end", {"ending": ending})
 
-    def _take_name(self) -> None:
-        try:
-            self._file.take_name()
-        except OSError as error:
-            partial = self._recording.partial
-            self._find(f"the session is whole, but keeps its name {partial}: {error}")
-
-    def _find(self, finding: str) -> None:
-        if finding not in self._findings:
-            self._findings.append(finding)
+    def _find(self, finding: str) -> bool:
+        """Keep a finding and tell it; False if it is known already."""
+        if finding in self._findings or len(self._findings) >= _MOST_FINDINGS:
+            return False
+        self._findings.append(finding)
+        self._say({"finding": finding})
+        return True
 
 
 def _is_urgent(feed: Feed) -> bool:

@@ -18,12 +18,15 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from seamlog.contracts import Pace
 from seamlog.errors import HardwareError, SpaceMissing
+
+from .segment import part_of
+from .storage import Storage
 
 RESERVED = ("id", "index", "start_ns", "pace", "ring_path", "producer")
 """Keys of the metadata record `seamlog.recording` which are not the user's."""
@@ -46,11 +49,12 @@ class Recording:
     force: bool
     pid: int
     meta: Mapping[str, str]
+    storage: Storage = field(default_factory=Storage)
 
     @property
     def partial(self) -> Path:
-        """Name of the session file until it is finished."""
-        return Path(self.path + ".part")
+        """Name of the first file until it is finished."""
+        return part_of(Path(self.path))
 
 
 def root() -> Path:
@@ -80,7 +84,8 @@ def make_folder(recording: Recording) -> tuple[Path, int]:
 
 def read_recording(folder: Path) -> Recording:
     """What `make_folder` wrote."""
-    return Recording(**json.loads((folder / "recording.json").read_bytes()))
+    document = json.loads((folder / "recording.json").read_bytes())
+    return Recording(**document | {"storage": Storage(**document["storage"])})
 
 
 def abandoned_folders() -> list[Path]:

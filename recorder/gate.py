@@ -37,6 +37,8 @@ class Gate:
         self.waits = waits
         self.strict = strict
         self.is_open = True
+        self.ending = ""
+        """Why the recording has stopped before it was closed; messages after it are counted."""
         self.owner = threading.get_ident()
         self._owner_name = threading.current_thread().name
         self._is_alive = is_alive
@@ -91,6 +93,8 @@ class Gate:
 
     def refuse_closed(self) -> bool:
         """A message after the end of the recording."""
+        if self.ending:
+            return self.refuse(self.ending)
         return self._complain("the recording is closed")
 
     def refuse_foreign(self) -> bool:

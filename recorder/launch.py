@@ -1,11 +1,14 @@
 """Starting, watching and ending the recorder process."""
 
 import fcntl
+import glob
 import json
 import os
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,8 +16,10 @@ from typing import Any
 import seamlog
 from seamlog.errors import OutputExists
 from seamlog.files import check_output
+from seamlog.segments import segment_path
 
 from .folder import Recording
+from .segment import claim, sync_folder
 
 _PATIENCE_S = 30.0
 """`finish` gives up when the recorder process has moved nothing for so long."""
@@ -36,12 +41,12 @@ def claim_partial(recording: Recording) -> int:
                 "away, or give --force to replace it"
             )
         partial.unlink()
-    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-    try:
-        descriptor = os.open(partial, flags, 0o644)
-    except FileExistsError:
-        raise OutputExists(f"{partial} is being recorded by another process") from None
-    fcntl.flock(descriptor, fcntl.LOCK_EX)
+    second = segment_path(Path(recording.path), 2)
+    if second.exists() and not recording.force:
+        raise OutputExists(f"{second}, of an earlier recording, is there; move it or give --force")
+    descriptor = claim(partial)
+    with suppress(OSError):
+        sync_folder(partial.parent)
     return descriptor
 
 
@@ -58,11 +63,16 @@ class WritingProcess:
     """The recorder process as the loop sees it.
 
     It is told of the loop's end by the end of a pipe and by a descriptor of the loop's process,
-    which also works when a forked child of the loop keeps the pipe open.
+    which also works when a forked child of the loop keeps the pipe open. What it says meanwhile,
+    a JSON object per line, goes to `hear` in a thread that sleeps until there is something.
     """
 
-    def __init__(self, folder: Path, partial: int, lock: int) -> None:
+    def __init__(
+        self, folder: Path, partial: int, lock: int, hear: Callable[[dict[str, Any]], None]
+    ) -> None:
         self._folder = folder
+        self._hear = hear
+        self._last: dict[str, Any] | None = None
         inner, self._pipe = os.pipe()
         own = _own_process()
         passed = [number for number in (partial, lock, inner, own) if number >= 0]
@@ -80,6 +90,19 @@ class WritingProcess:
             )
         for number in passed:
             os.close(number)
+        self._listener = threading.Thread(target=self._listen, name="recorder", daemon=True)
+        self._listener.start()
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        with self._process.stdout as lines:
+            for line in lines:
+                with suppress(ValueError):
+                    said = json.loads(line)
+                    if "channels" in said:
+                        self._last = said
+                    else:
+                        self._hear(said)
 
     @property
     def pid(self) -> int:
@@ -96,31 +119,29 @@ class WritingProcess:
         if pipe >= 0:
             os.close(pipe)
 
-    def finish(self, progress: Path) -> dict[str, Any] | None:
+    def finish(self, path: Path) -> dict[str, Any] | None:
         """Tell the process to end and wait while it moves; its accounts, None if it was lost.
 
-        `progress` is a file whose growth shows that it works.
+        The growth of the `.part` files of the session `path` shows that it works.
         """
         if self._pipe >= 0:
             with suppress(BrokenPipeError):
                 os.write(self._pipe, b"C")
         self.leave()
-        output = self._wait(progress)
-        try:
-            found = json.loads(output)
-        except ValueError:
-            return None
-        return found if isinstance(found, dict) else None
+        if self._has_ended(path):
+            self._listener.join(_PATIENCE_S)
+        return self._last
 
-    def _wait(self, progress: Path) -> bytes:
+    def _has_ended(self, path: Path) -> bool:
         seen, since = -1, time.monotonic()
         while time.monotonic() - since < _PATIENCE_S:
             with suppress(subprocess.TimeoutExpired):
-                return bytes(self._process.communicate(timeout=0.5)[0])
-            size = progress.stat().st_size if progress.exists() else seen
+                self._process.wait(timeout=0.5)
+                return True
+            size = _size_of_parts(path)
             if size != seen:
                 seen, since = size, time.monotonic()
-        return b""
+        return False
 
     def last_words(self) -> str:
         """What the process wrote to its error stream, the last line of it."""
@@ -128,6 +149,14 @@ class WritingProcess:
             lines = (self._folder / "errors.txt").read_text(errors="replace").split("\n")
             return next((line for line in reversed(lines) if line.strip()), "")
         return ""
+
+
+def _size_of_parts(path: Path) -> int:
+    size = 0
+    for part in path.parent.glob(f"{glob.escape(path.stem)}*.part"):
+        with suppress(FileNotFoundError):
+            size += part.stat().st_size
+    return size
 
 
 def _own_process() -> int:

@@ -1,7 +1,8 @@
 """The recorder process: `python -m seamlog.recorder.process FOLDER FILE PIPE LOOP`.
 
 The three numbers are descriptors: the `.part` file, a pipe that ends with the loop, and the
-loop's process (-1 where the system has none). At its end it prints the final accounts as JSON.
+loop's process (-1 where the system has none). It prints a JSON object per line: `finding`,
+`warning` and `stop` while it works, the final accounts at its end.
 """
 
 import json
@@ -9,6 +10,7 @@ import os
 import select
 import signal
 import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,6 +19,8 @@ from .folder import read_recording
 
 _PASS_MS = 10
 """Pause between two looks at the rings."""
+_LONGEST = 500
+"""Characters of one text: a line shorter than a page is written whole or not at all."""
 
 
 def main(arguments: list[str]) -> None:
@@ -25,12 +29,21 @@ def main(arguments: list[str]) -> None:
         signal.signal(ignored, signal.SIG_IGN)
     folder = Path(arguments[0])
     partial, pipe, loop = (int(text) for text in arguments[1:])
-    engine = Engine(read_recording(folder), folder, partial)
+    os.set_blocking(sys.stdout.fileno(), False)
+    engine = Engine(read_recording(folder), folder, partial, _say)
     ending = _record(engine, pipe, loop)
     document = engine.finish(ending)
+    os.set_blocking(sys.stdout.fileno(), True)
     with suppress(OSError):
-        sys.stdout.write(json.dumps(document))
+        sys.stdout.write(json.dumps(document) + "\n")
         sys.stdout.flush()
+
+
+def _say(said: Mapping[str, str]) -> None:
+    """Tell the loop, which may be gone or may not listen: then it is told at the end."""
+    short = {key: text[:_LONGEST] for key, text in said.items()}
+    with suppress(OSError):
+        os.write(sys.stdout.fileno(), json.dumps(short).encode() + b"\n")
 
 
 def _record(engine: Engine, pipe: int, loop: int) -> str:

@@ -7,7 +7,8 @@ import threading
 import time
 import uuid
 import weakref
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from threading import get_ident
 from types import TracebackType
@@ -27,6 +28,7 @@ from .gate import Gate
 from .launch import WritingProcess, claim_partial
 from .put_source import Put
 from .ring import Ring
+from .storage import DEFAULT, Storage, SyncPolicy
 
 _log = logging.getLogger("seamlog.recorder")
 _living: "weakref.WeakSet[Recorder]" = weakref.WeakSet()
@@ -38,7 +40,8 @@ class Recorder:
     `path` is the session file to be; `meta` goes into its metadata. `clock` gives the log times.
     `pace` "paced": a full ring drops the new message; "simulated": `put` waits for room.
     `strict` makes `put` and `log` raise `RecordingError` instead of returning False. `force`
-    replaces an existing file.
+    replaces an existing file. `storage` says how often is synced, where files end, how much disk
+    may be used.
 
     Raises `OutputExists`, `InputError` (no such folder), `HardwareError`. Afterwards neither
     `put` nor `log` nor `log_frame` raises: they return False and count.
@@ -52,21 +55,23 @@ class Recorder:
         pace: Pace = "paced",
         strict: bool = False,
         force: bool = False,
+        storage: Storage = DEFAULT,
     ) -> None:
         self.clock: Clock = clock or MonotonicClock()
         self.strict = strict
-        self._recording = _describe(Path(path), meta or {}, self.clock, pace, force)
+        self._recording = _describe(Path(path), meta or {}, self.clock, pace, force, storage)
+        self._channels: dict[tuple[str, int], Channel] = {}
+        self._heard: list[str] = []
         _warn_of_abandoned()
         descriptor = claim_partial(self._recording)
         try:
             folder, lock = make_folder(self._recording)
-            self._process = WritingProcess(folder, descriptor, lock)
+            self._process = WritingProcess(folder, descriptor, lock, self._hear)
         except BaseException:
             self._recording.partial.unlink(missing_ok=True)
             os.close(descriptor)
             raise
         self._tray = OutTray(folder)
-        self._channels: dict[tuple[str, int], Channel] = {}
         self._mine = threading.local()
         self._strangers: dict[str, str] = {}
         self._final: Status | None = None
@@ -76,6 +81,10 @@ class Recorder:
     def id(self) -> str:
         """Id of the recording, in the metadata record `seamlog.recording`."""
         return self._recording.id
+
+    @property
+    def _sync(self) -> SyncPolicy:
+        return self._recording.storage.sync
 
     @property
     def path(self) -> Path:
@@ -156,7 +165,7 @@ class Recorder:
             ring_account(row.topic, row.metadata["producer"], row.gate.ring, row.gate.ring.accepted)
             for row in list(self._channels.values())
         )
-        return Status(self.id, str(self.path), alive, rows, findings)
+        return Status(self.id, str(self.path), alive, rows, findings, sync=self._sync)
 
     def close(self) -> Status:
         """End the recording: all that was accepted is in the file, the file has its name.
@@ -165,10 +174,10 @@ class Recorder:
         """
         if self._final is None:
             self._stop_channels()
-            document = self._process.finish(self._recording.partial)
+            document = self._process.finish(self.path)
             self._final = self._conclude(document)
             _living.discard(self)
-            _tell(self._final)
+            _tell(self._final, self._heard)
         return self._final
 
     def __enter__(self) -> Self:
@@ -229,7 +238,20 @@ class Recorder:
             _stop(channels)
 
     def _findings(self) -> tuple[str, ...]:
-        return tuple(f"{topic}: {why}" for topic, why in self._strangers.items())
+        strangers = (f"{topic}: {why}" for topic, why in self._strangers.items())
+        return (*strangers, *self._heard)
+
+    def _hear(self, said: Mapping[str, str]) -> None:
+        """What the recorder process says while it works; called in a thread of its own."""
+        for kind, text in said.items():
+            _log.warning("%s: %s", self.path, text)
+            if kind == "finding":
+                self._heard.append(text)
+            elif kind == "stop":
+                for channel in list(self._channels.values()):
+                    channel.gate.ending = text
+                    channel.gate.is_open = False
+                    channel.stop()
 
     def _lost_process(self) -> str:
         words = self._process.last_words()
@@ -244,10 +266,12 @@ class Recorder:
             status = self.status()
             stuck = "the recorder process is still finishing the file"
             findings = (*status.findings, stuck) if status.is_recording else status.findings
-            return Status(self.id, str(self.path), False, status.channels, findings)
+            return replace(status, is_recording=False, findings=findings)
         rows = tuple(read_account(row) for row in document["channels"])
-        findings = (*self._findings(), *document["findings"])
-        return Status(self.id, str(self.path), False, rows, findings)
+        findings = tuple(dict.fromkeys((*self._findings(), *document["findings"])))
+        return Status(
+            self.id, str(self.path), False, rows, findings, tuple(document["files"]), self._sync
+        )
 
     def _leave(self) -> None:
         """In a forked child: take no part in the recording."""
@@ -263,19 +287,27 @@ def _stop(channels: list[Channel]) -> None:
 
 
 def _describe(
-    path: Path, meta: Mapping[str, str], clock: Clock, pace: Pace, force: bool
+    path: Path,
+    meta: Mapping[str, str],
+    clock: Clock,
+    pace: Pace,
+    force: bool,
+    storage: Storage,
 ) -> Recording:
     anchor = clock.anchor_ns if isinstance(clock, MonotonicClock) else None
     named = {str(key): str(value) for key, value in meta.items()}
     if taken := sorted(set(named) & set(RESERVED)):
         raise UsageError(f"metadata {', '.join(taken)}: the recorder writes these itself")
     start, where = clock.now_ns(), str(path.absolute())
-    return Recording(uuid.uuid4().hex, where, start, pace, anchor, force, os.getpid(), named)
+    return Recording(
+        uuid.uuid4().hex, where, start, pace, anchor, force, os.getpid(), named, storage
+    )
 
 
-def _tell(status: Status) -> None:
+def _tell(status: Status, heard: Collection[str]) -> None:
     for finding in status.findings:
-        _log.warning("%s: %s", status.path, finding)
+        if finding not in heard:
+            _log.warning("%s: %s", status.path, finding)
     for row in status.channels:
         if row.dropped or row.refused or row.lost:
             counts = f"{row.dropped} dropped, {row.refused} refused, {row.lost} lost"

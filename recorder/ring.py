@@ -5,6 +5,16 @@ A ring is a file of a header page and `capacity` bytes of records. All words of 
 `tail` in messages: one store publishes a message and counts it, and a loop killed between two
 instructions leaves the accounts exact. Other rings count them in bytes.
 
+Layout: the header page holds 64-bit little-endian words, numbered as below: 0-6 of the producer,
+16-21 of the consumer, 32-34 that the ring is one, its capacity and its stride; from byte 1024 on
+two bytes of length and the text why a message was turned away first. Records follow at byte 4096:
+fixed-width messages stand in slots of `stride` bytes, message n in slot n % slots, and `head` and
+`tail` count messages; others stand one behind the other as MCAP Message records (or RAW_FRAME,
+see `varying.RAW_HEAD`), a SKIP byte says that the rest up to the end is unused, and `head` and
+`tail` count bytes. What is between `tail` and `head` is not in the session file yet, but for the
+last chunk, which may be in both if the recorder died between writing it and moving `tail`: its
+sequence numbers tell.
+
 The producer stores a record and then `head`; the consumer reads `head` and, at least one system
 call later, the records, which it verifies. On x86-64 the order of stores is given; elsewhere the
 delay and the verification stand in for a barrier.
@@ -23,7 +33,7 @@ MAGIC = int.from_bytes(b"SEAMRING", "little")
 
 (HEAD, ACCEPTED, DROPPED, REFUSED, REFUSED_FOREIGN, FIRST_DROPPED, LAST_DROPPED) = range(7)
 """Words of the producer; the two sequences are stored plus one, 0 means none."""
-(TAIL, WRITTEN, LOST, HIGH_WATER_PPM, LAST_SYNC_NS) = range(16, 21)
+(TAIL, WRITTEN, LOST, HIGH_WATER_PPM, LAST_SYNC_NS, DISCARDED) = range(16, 22)
 """Words of the consumer, on a cache line of their own."""
 (MAGIC_WORD, CAPACITY, STRIDE) = range(32, 35)
 _REASON_AT, _REASON_BYTES = 1024, 1000

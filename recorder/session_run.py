@@ -13,6 +13,7 @@ from seamlog.files import check_output, write_bytes
 from .accounts import Status
 from .pacing import DurationOver, Pacer
 from .recorder import Recorder
+from .storage import DEFAULT, Storage
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,7 @@ def run_source(
     realtime: bool = False,
     duration_s: float | None = None,
     force: bool = False,
+    storage: Storage = DEFAULT,
 ) -> Run:
     """Record `source` into `path`.
 
@@ -39,7 +41,7 @@ def run_source(
     logged nothing, and its error passes through.
     """
     pace: Pace = "paced" if realtime else source.pace
-    recorder = Recorder(path, meta, source.clock, pace, force=force)
+    recorder = Recorder(path, meta, source.clock, pace, force=force, storage=storage)
     try:
         result, ending = _run(source, recorder, realtime, duration_s)
     except BaseException:

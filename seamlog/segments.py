@@ -15,6 +15,11 @@ PROBLEMS = "seamlog.problems"
 _SEGMENT = re.compile(r"(?P<stem>.+?)(?:\.\d{4,})?\.mcap")
 
 
+def segment_path(first: Path, number: int) -> Path:
+    """Name of file `number` (from 1) of the session whose first file is `first`."""
+    return first if number == 1 else first.with_name(f"{first.stem}.{number:04d}{first.suffix}")
+
+
 def find_segments(path: str | Path | Sequence[str | Path], limits: Limits) -> list[McapFile]:
     """Open all files of the session that `path` names, in their order."""
     if not isinstance(path, str | Path):

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -11,6 +12,10 @@ from seamlog.errors import UsageError
 from seamlog.outcome import Outcome
 
 from .record_outcome import record_outcome
+from .storage_options import storage_options
+
+if TYPE_CHECKING:
+    from seamlog.recorder.storage import Storage
 
 
 @command()
@@ -20,6 +25,7 @@ from .record_outcome import record_outcome
 @click.option("--meta", multiple=True, metavar="KEY=VALUE", help="Into the session's metadata.")
 @click.option("--pace", type=click.Choice(["realtime"]), help="Hold a simulated source to time.")
 @click.option("--duration", type=click.FloatRange(min=0, min_open=True), help="End after S s.")
+@storage_options
 @force_option
 def record(
     name: str,
@@ -29,6 +35,7 @@ def record(
     meta: tuple[str, ...],
     pace: str | None,
     duration: float | None,
+    storage: "Storage",
     force: bool,
 ) -> Outcome:
     """Record a live source into a session; Ctrl-C ends the recording and finishes the file."""
@@ -42,7 +49,7 @@ def record(
 
     from seamlog.recorder.session_run import run_source
 
-    run = run_source(source, output, values, pace == "realtime", duration, force)
+    run = run_source(source, output, values, pace == "realtime", duration, force, storage)
     return record_outcome(run, output)
 
 

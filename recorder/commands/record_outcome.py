@@ -18,7 +18,7 @@ def record_outcome(run: "Run", output: Path) -> Outcome:
 
 
 def _document(run: "Run") -> dict[str, Any]:
-    from seamlog.recorder.accounts import ACKNOWLEDGEMENT, account_document
+    from seamlog.recorder.accounts import account_document, acknowledgement
 
     return {
         "path": run.status.path,
@@ -27,23 +27,27 @@ def _document(run: "Run") -> dict[str, Any]:
         "complete": run.status.is_complete,
         "findings": list(run.status.findings),
         "channels": [account_document(row) for row in run.status.channels],
+        "segments": list(run.status.files),
         "files": [str(path) for path in run.files],
-        "acknowledgement": dict(ACKNOWLEDGEMENT),
+        "acknowledgement": acknowledgement(run.status.sync),
     }
 
 
 def _text(run: "Run", output: Path) -> str:
-    from seamlog.recorder.accounts import ACKNOWLEDGEMENT
+    from seamlog.recorder.accounts import acknowledgement
 
     written = sum(row.written for row in run.status.channels)
     lines = [f"{output}: {written} messages; {run.ending}"]
+    if more := run.status.files[1:]:
+        lines += [f"it goes on in {len(more)} more file{'s'[: len(more) > 1]}, up to {more[-1]}"]
     lines += [f"{path}: written by the source" for path in run.files]
     wide = max((len(row.topic) for row in run.status.channels), default=5)
     lines += [f"  {'topic':<{wide}}  {'written':>9} {'dropped':>8} {'refused':>8}  longest gap"]
     lines += [f"  {row.topic:<{wide}}  {_counts(row)}" for row in run.status.channels]
     lines += [f"  {finding}" for finding in run.status.findings]
     lines += [_verdict(run), "What an acknowledgement survives:"]
-    return "\n".join(lines + [f"  {level}: {text}" for level, text in ACKNOWLEDGEMENT])
+    levels = acknowledgement(run.status.sync).items()
+    return "\n".join(lines + [f"  {level}: {text}" for level, text in levels])
 
 
 def _counts(row: "Account") -> str:

@@ -46,6 +46,7 @@ class FileWriter:
         self._chunks: list[bytes] = []
         self._attachments: list[AttachmentEntry] = []
         self._metadata: list[MetadataEntry] = []
+        self._chunk_index_bytes = 0
         self.statistics = Statistics()
         self._write([records.MAGIC + records.header(profile, library)])
 
@@ -53,6 +54,13 @@ class FileWriter:
     def size(self) -> int:
         """Bytes of whole records written so far."""
         return self._size
+
+    @property
+    def summary_size(self) -> int:
+        """About how many bytes `finish` will write, rather too many than too few."""
+        heads = 2 * sum(len(head) for head in self._heads.values())
+        rows = 400 * (len(self._attachments) + len(self._metadata) + 1)
+        return heads + rows + self._chunk_index_bytes
 
     def add_schema(
         self, name: str, text: str | bytes, encoding: str = "ros2msg", schema_id: int | None = None
@@ -178,6 +186,7 @@ class FileWriter:
 
     def _note(self, entry: ChunkEntry, counts: Mapping[int, int]) -> None:
         self._chunks.append(records.chunk_index(entry))
+        self._chunk_index_bytes += len(self._chunks[-1])
         self.statistics.chunk_count += 1
         for number, count in counts.items():
             self.statistics.add(number, count, entry.start_ns, entry.end_ns)

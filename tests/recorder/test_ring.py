@@ -44,13 +44,12 @@ def open_session_file(topic: str) -> Iterator[tuple[Path, SessionFile]]:
         try:
             yield path, file
         finally:
-            file.close()
+            file.finish()
 
 
 def finish(path: Path, file: SessionFile, feed: Feed) -> None:
     assert not feed.pump(0.0, flush=True)
-    file.finish()
-    file.take_name()
+    assert file.finish() == []
 
 
 actions = st.lists(st.one_of(st.integers(1, 12), st.just(0), st.just(-1)), max_size=40)
