@@ -25,7 +25,17 @@ from .figures import draw_histogram, draw_plot
 from .numbers import figure_quantity, format_quantity
 from .verdicts import grouped, limits_text
 
-SCRIPTS = ("decode.js", "theme.js", "plot.js", "cursor.js", "photo.js", "frames.js", "main.js")
+SCRIPTS = (
+    "decode.js",
+    "theme.js",
+    "columns.js",
+    "plot.js",
+    "cursor.js",
+    "export.js",
+    "photo.js",
+    "frames.js",
+    "main.js",
+)
 """Our own scripts, in the order in which they are put into one function."""
 
 UPLOT = ("uPlot.iife.min.js", "uPlot.min.css", "LICENSE")

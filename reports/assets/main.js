@@ -36,9 +36,23 @@ function makeSlider(bus, domain, places, name) {
     slider.setAttribute("aria-valuetext", text.textContent);
     if (here !== undefined) slider.value = String(nearest(places, here));
   });
+  watchZoom(bus, domain);
   document.getElementById("cursor").hidden = false;
   document.body.classList.add("with-cursor");
   bus.show(domain, places[0]);
+}
+
+/* Zoom by buttons, for those without a mouse; they act on the plots that the slider moves along. */
+function watchZoom(bus, domain) {
+  const button = (name) => document.getElementById(`zoom-${name}`);
+  const plot = bus.plots.find((one) => one.spec.domain === domain) ?? bus.plots[0];
+  if (!plot) return;
+  button("in").addEventListener("click", () => bus.scale(plot, 0.5));
+  button("out").addEventListener("click", () => bus.scale(plot, 2));
+  button("all").addEventListener("click", bus.whole);
+  const tell = () => { button("out").disabled = button("all").disabled = bus.view === null; };
+  bus.zoomWatchers.push(tell);
+  tell();
 }
 
 function watchLinks(bus) {
@@ -64,6 +78,7 @@ async function enliven() {
     if (plot === null) continue;
     bus.plots.push(plot);
     watchKeys(plot, bus);
+    watchExport(plot);
     figure.classList.add("is-live");
   }
   const photo = bus.photos.find((one) => one.isBead), plot = bus.plots[0];
@@ -75,6 +90,8 @@ async function enliven() {
   watchLinks(bus);
   const first = document.querySelector("#verdict a.place[data-domain]");
   if (first) bus.show(first.dataset.domain, Number(first.dataset.x));
+  /* For scripts in the console and for tests: the cursor and the zoom of each domain. */
+  window.seamlog = Object.freeze({ show: bus.show, zoom: bus.zoom, whole: bus.whole });
 }
 
 enliven()

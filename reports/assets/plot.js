@@ -1,6 +1,7 @@
 /* One live plot in the place of its drawing: every point, thinned only while drawing. */
 
 const PLOT_HEIGHT = 250, STRIP_HEIGHT = 165, COLOURS = 6;
+const LINE = 1.5, DENSE = 4;
 const FONT = "12px system-ui, sans-serif";
 
 /* A point of a curve with as many decimals as its series allows. */
@@ -24,16 +25,29 @@ function alone(u, index) {
   return found;
 }
 
+/* Dense curves are thin lines: a step cannot be told from a slope there, and thick ones cost a frame. */
+function pathsOf(step, plain) {
+  const sparse = step ? uPlot.paths.stepped({ align: 1 }) : uPlot.paths.linear();
+  const thin = plain ? columnPaths() : uPlot.paths.linear();
+  return (u, at, first, last) => {
+    const dense = last - first > DENSE * u.bbox.width;
+    u.series[at].width = dense ? 1 / devicePixelRatio : LINE;
+    return (dense ? thin : sparse)(u, at, first, last);
+  };
+}
+
 function seriesOf(spec, data) {
   const list = [{ label: spec.x_label }];
   const bands = [], places = [];
+  const banded = spec.series.some((series) => series.low && series.high);
   spec.series.forEach((series, i) => {
     const stroke = () => colour(`--c${(i % COLOURS) + 1}`);
-    const paths = series.step ? uPlot.paths.stepped({ align: 1 }) : undefined;
     places.push(list.length);
     const points = { show: false };
-    const dots = Array.isArray(data[list.length]) ? { show: true, size: 3, filter: alone } : points;
-    list.push({ label: series.label, stroke, width: 1.5, paths, points: dots, spanGaps: false });
+    const gappy = Array.isArray(data[list.length]);
+    const paths = pathsOf(series.step, !gappy && !banded);
+    const dots = gappy ? { show: true, size: 3, filter: alone } : points;
+    list.push({ label: series.label, stroke, width: LINE, paths, points: dots, spanGaps: false });
     if (series.low && series.high) {
       const edge = { stroke: "transparent", width: 0, points, auto: false };
       list.push({ ...edge, label: "high" }, { ...edge, label: "low" });
