@@ -1,8 +1,8 @@
 """The report beside Bokeh and Plotly: size, first paint, all drawn, panning, in one run.
 
-Six signals at 1 kHz in six plots over one time, with spikes of single samples and motion of 7 to 12 Hz;
-100 camera frames (the peers have none). Pan: all six x ranges are set, then the next frame is awaited.
-Headless Chromium, software rendering; wall-clock times, so run it on a quiet machine.
+Six signals at 1 kHz in six plots over one time, with spikes of single samples and motion of 7 to
+12 Hz; 100 camera frames (the peers have none). Pan: all six x ranges are set, then the next frame
+is awaited. Headless Chromium, software rendering; wall-clock times, so run it on a quiet machine.
 """
 
 import shutil
@@ -141,7 +141,8 @@ def bokeh_page(folder: Path, t: Floats, ys: Sequence[Floats]) -> Page:
     path = folder / "bokeh.html"
     path.write_text(file_html(column(*plots), INLINE, "six signals"))
     ready = "window.Bokeh && Bokeh.documents.length && Bokeh.documents[0].is_idle"
-    pan = "const r = Bokeh.documents[0].roots()[0].children[0].x_range; r.setv({start: low, end: high})"
+    plot = "Bokeh.documents[0].roots()[0].children[0]"
+    pan = f"{plot}.x_range.setv({{start: low, end: high}})"
     return Page(path, ready, pan)
 
 
@@ -157,7 +158,8 @@ def plotly_page(folder: Path, t: Floats, ys: Sequence[Floats]) -> Page:
     path = folder / "plotly.html"
     path.write_text(whole.to_html(include_plotlyjs=True))
     ready = "document.querySelectorAll('.js-line').length >= 6"
-    pan = "await Plotly.relayout(document.querySelector('.js-plotly-plot'), {'xaxis.range': [low, high]})"
+    plot = "document.querySelector('.js-plotly-plot')"
+    pan = f"await Plotly.relayout({plot}, {{'xaxis.range': [low, high]}})"
     return Page(path, ready, pan)
 
 

@@ -40,15 +40,18 @@ INK = """([id, value, at]) => {
     const box = canvas.getBoundingClientRect();
     const scale = width / box.width;
     const left = (over.left - box.left) * scale, wide = over.width * scale;
+    const upper = (over.top - box.top) * scale, lower = (over.bottom - box.top) * scale;
     const column = Math.floor(left + at * wide);
     let top = height, bottom = -1;
     for (let x = column - 1; x <= column + 1; x++) {
-        for (let y = Math.ceil((over.top - box.top) * scale); y < (over.bottom - box.top) * scale; y++) {
+        for (let y = Math.ceil(upper); y < lower; y++) {
             const i = 4 * (y * width + x);
-            if (data[i + 3] > 60 && data[i + 2] > data[i] + 60) { top = Math.min(top, y); bottom = Math.max(bottom, y); }
+            if (data[i + 3] <= 60 || data[i + 2] <= data[i] + 60) continue;
+            top = Math.min(top, y);
+            bottom = Math.max(bottom, y);
         }
     }
-    return [top, bottom, (over.top - box.top) * scale, (over.bottom - box.top) * scale];
+    return [top, bottom, upper, lower];
 }"""
 
 
@@ -114,8 +117,8 @@ def dense(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Floats]:
     y[random.integers(0, DENSE, 12)] = -4.0
     stamps = START_NS + np.arange(DENSE) * 1_000_000
     results = Results.create(folder / "results")
-    table = ({"stamp_ns": stamps, "wave": y}, {})
-    results.write(Part(part="signals", title="Signals"), tables={"wave": table})
+    columns = {"stamp_ns": stamps, "wave": y}
+    results.write(Part(part="signals", title="Signals"), tables={"wave": (columns, {})})
     report = Report()
     report.add_results(results)
     report.write(folder / "report.html")
