@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from seamlog.contracts import Axis, Controller
 
-from .dynamics import Plant, make_plant
+from .compiled import Run, compiled_run
+from .controllers.law import LawController
+from .dynamics import CoulombPlant, Plant, StribeckPlant, make_plant
 
 Floats = NDArray[np.float64]
 
@@ -75,29 +77,25 @@ def simulate(
     """
     count = reference.position_m.shape[0]
     plant = plant or make_plant(axis, period_s)
-    step, output, state = plant.step, controller.output, controller.state
     limit = axis.saturation
-    noise_m, noise_m_s = _series(position_noise_m, count), _series(velocity_noise_m_s, count)
-    load = _series(disturbance, count)
     asked = (reference.position_m, reference.velocity_m_s, reference.acceleration_m_s2)
-    inputs = zip(*(row.tolist() for row in (*asked, noise_m, noise_m_s, load)), strict=True)
-    position = float(asked[0][0]) if initial_position_m is None else initial_position_m
-    velocity = float(asked[1][0]) if initial_velocity_m_s is None else initial_velocity_m_s
-    waiting = deque([initial_command] * axis.delay_periods)
-    send, arrive = waiting.append, waiting.popleft
-    rows: list[float] = []
-    states: list[float] = []
-    log, log_state = rows.extend, states.extend
-    for asked_m, asked_m_s, asked_m_s2, off_m, off_m_s, push in inputs:
-        seen_m = off_m + (
-            floor(position / encoder_step_m + 0.5) * encoder_step_m if encoder_step_m else position
-        )
-        wanted = output(asked_m, asked_m_s, asked_m_s2, seen_m, velocity + off_m_s)
-        log((position, velocity, wanted))
-        log_state(state())
-        send(limit if wanted > limit else -limit if wanted < -limit else wanted)
-        position, velocity = step(position, velocity, arrive(), push)
-    position_m, velocity_m_s, wanted_command = _table(rows, count).T
+    noise_m, noise_m_s = _series(position_noise_m, count), _series(velocity_noise_m_s, count)
+    columns = (*asked, noise_m, noise_m_s, _series(disturbance, count))
+    start = (
+        float(asked[0][0]) if initial_position_m is None else initial_position_m,
+        float(asked[1][0]) if initial_velocity_m_s is None else initial_velocity_m_s,
+    )
+    loop = _compiled(controller, plant) or _run
+    rows, states = loop(
+        controller,
+        plant,
+        np.column_stack(columns),
+        start,
+        [initial_command] * axis.delay_periods,
+        limit,
+        encoder_step_m,
+    )
+    position_m, velocity_m_s, wanted_command = rows.T
     counted_m = position_m
     if encoder_step_m:
         counted_m = np.floor(position_m / encoder_step_m + 0.5) * encoder_step_m
@@ -111,8 +109,49 @@ def simulate(
         command=command,
         applied_command=np.concatenate([early, command])[:count],
         saturated=np.abs(wanted_command) > limit,
-        states=_table(states, count),
+        states=states,
     )
+
+
+def _run(
+    controller: Controller,
+    plant: Plant,
+    inputs: Floats,
+    start: tuple[float, float],
+    waiting: list[float],
+    limit: float,
+    encoder_step_m: float,
+) -> tuple[Floats, Floats]:
+    """The loop itself: (position, velocity, wanted command) and states at each sample.
+
+    `inputs` has the columns reference (3), noise of position and of velocity, disturbance.
+    """
+    step, output, state = plant.step, controller.output, controller.state
+    position, velocity = start
+    under_way = deque(waiting)
+    send, arrive = under_way.append, under_way.popleft
+    rows: list[float] = []
+    states: list[float] = []
+    log, log_state = rows.extend, states.extend
+    for asked_m, asked_m_s, asked_m_s2, off_m, off_m_s, push in inputs.tolist():
+        seen_m = off_m + (
+            floor(position / encoder_step_m + 0.5) * encoder_step_m if encoder_step_m else position
+        )
+        wanted = output(asked_m, asked_m_s, asked_m_s2, seen_m, velocity + off_m_s)
+        log((position, velocity, wanted))
+        log_state(state())
+        send(limit if wanted > limit else -limit if wanted < -limit else wanted)
+        position, velocity = step(position, velocity, arrive(), push)
+    return _table(rows, len(inputs)), _table(states, len(inputs))
+
+
+def _compiled(controller: Controller, plant: Plant) -> Run | None:
+    """The same loop as machine code, where controller and plant are pure functions of numbers."""
+    if not isinstance(controller, LawController):
+        return None
+    if not isinstance(plant, CoulombPlant | StribeckPlant):
+        return None
+    return compiled_run(controller.law, plant.kernel)
 
 
 def _series(values: ArrayLike, count: int) -> Floats:

@@ -90,11 +90,12 @@ _LOG_SIXTEENTHS = (
 
 def arctangent(x: float) -> float:
     """Angle whose tangent is `x`, rad; NaN stays NaN."""
-    if x < 0.0:
-        return -arctangent(-x)
-    if x > 1.0:
-        return _HALF_PI - _arctangent_to_one(1.0 / x)
-    return _arctangent_to_one(x) if x <= 1.0 else x
+    size = -x if x < 0.0 else x
+    if size > 1.0:
+        angle = _HALF_PI - _arctangent_to_one(1.0 / size)
+    else:
+        angle = _arctangent_to_one(size) if size <= 1.0 else size
+    return -angle if x < 0.0 else angle
 
 
 def _arctangent_to_one(x: float) -> float:

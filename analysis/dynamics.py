@@ -8,12 +8,12 @@ and disturbances are in the axis' command unit, positions in m, velocities in m/
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from seamlog.contracts import Axis
 
 from .deterministic import exponential, log_one_plus
-from .friction import sliding_friction
+from .friction import stribeck_rise
 
 
 class Plant(Protocol):
@@ -34,6 +34,105 @@ class Ripple:
     pitch_m: float
 
 
+Side = tuple[float, float, float, float, float, float, float]
+"""Motion in one direction: decay, travel, speed_gain, travel_gain over a whole period (see
+`held_motion`), Coulomb force with the sign of the direction, viscous coefficient, break-away force.
+
+A plain tuple, as its unpacking is the quickest way to seven numbers.
+"""
+
+
+class CoulombConstants(NamedTuple):
+    """What `coulomb_step` knows of an axis and its period."""
+
+    forward: Side
+    backward: Side
+    inertia: float
+    offset: float
+    period_s: float
+
+
+def _side(axis: Axis, sense: float, period_s: float) -> Side:
+    static = max(axis.static_friction, axis.coulomb_friction)
+    coulomb = sense * axis.coulomb_friction
+    return (*held_motion(axis, period_s), coulomb, axis.viscous_friction, static)
+
+
+def coulomb_step(
+    plant: CoulombConstants,
+    position_m: float,
+    velocity_m_s: float,
+    command: float,
+    disturbance: float,
+) -> tuple[float, float]:
+    """Position and velocity one period later, exact to rounding; see `CoulombPlant`."""
+    force = command - plant.offset - disturbance
+    if velocity_m_s > 0.0:
+        decay, travel, speed_gain, travel_gain, friction, viscous, _ = plant.forward
+    elif velocity_m_s < 0.0:
+        decay, travel, speed_gain, travel_gain, friction, viscous, _ = plant.backward
+    elif velocity_m_s == 0.0:
+        return _step_from_rest(plant, position_m, force)
+    else:
+        return math.nan, math.nan
+    net = force - friction
+    end_m_s = decay * velocity_m_s + speed_gain * net
+    if (end_m_s < 0.0) if velocity_m_s > 0.0 else (end_m_s > 0.0):
+        return _step_through_rest(plant, position_m, velocity_m_s, force, net, viscous)
+    return position_m + travel * velocity_m_s + travel_gain * net, end_m_s
+
+
+def _holds(plant: CoulombConstants, force: float) -> bool:
+    return -plant.backward[6] <= force <= plant.forward[6]
+
+
+def _step_from_rest(
+    plant: CoulombConstants, position_m: float, force: float
+) -> tuple[float, float]:
+    if _holds(plant, force):
+        return position_m, 0.0
+    _, _, speed_gain, travel_gain, friction, _, _ = plant.forward if force > 0.0 else plant.backward
+    net = force - friction
+    return position_m + travel_gain * net, speed_gain * net
+
+
+def _step_through_rest(
+    plant: CoulombConstants,
+    position_m: float,
+    velocity_m_s: float,
+    force: float,
+    net: float,
+    viscous: float,
+) -> tuple[float, float]:
+    """`net` is the force less Coulomb friction, until the axis comes to rest."""
+    pull = net - viscous * velocity_m_s
+    share = viscous * velocity_m_s / pull
+    stop_s = -velocity_m_s * plant.inertia / pull * _log_slope(share)
+    stop_s = min(max(stop_s, 0.0), plant.period_s)
+    position_m, _ = _glide(position_m, velocity_m_s, pull, stop_s, viscous, plant.inertia)
+    if _holds(plant, force):
+        return position_m, 0.0
+    _, _, _, _, friction, viscous, _ = plant.forward if force > 0.0 else plant.backward
+    rest_s = plant.period_s - stop_s
+    return _glide(position_m, 0.0, force - friction, rest_s, viscous, plant.inertia)
+
+
+def _glide(
+    position_m: float,
+    velocity_m_s: float,
+    pull: float,
+    time_s: float,
+    viscous: float,
+    inertia: float,
+) -> tuple[float, float]:
+    """`pull` is inertia times the acceleration at the start."""
+    exponent = viscous * time_s / inertia
+    start_m_s2 = pull / inertia
+    position_m += velocity_m_s * time_s
+    position_m += start_m_s2 * time_s * time_s * _mean_travel(exponent)
+    return position_m, velocity_m_s + start_m_s2 * time_s * _mean_decay(exponent)
+
+
 class CoulombPlant:
     """Coulomb and viscous friction, stepped exactly from event to event (sign change, stick).
 
@@ -41,73 +140,86 @@ class CoulombPlant:
     closed-form pieces. The Stribeck figures of `axis` are used only for the break-away force.
     """
 
+    kernel = staticmethod(coulomb_step)
+
     def __init__(self, axis: Axis, period_s: float) -> None:
-        self._inertia, self._offset = axis.inertia, axis.offset
-        self._period_s = period_s
-        forward, backward = axis, backward_axis(axis)
-        self._viscous = (forward.viscous_friction, backward.viscous_friction)
-        self._coulomb = (forward.coulomb_friction, -backward.coulomb_friction)
-        self._static = tuple(
-            max(a.static_friction, a.coulomb_friction) for a in (forward, backward)
-        )
-        self._forward = (*held_motion(forward, period_s), self._coulomb[0])
-        self._backward = (*held_motion(backward, period_s), self._coulomb[1])
+        sides = (_side(axis, 1.0, period_s), _side(backward_axis(axis), -1.0, period_s))
+        self.constants = CoulombConstants(*sides, axis.inertia, axis.offset, period_s)
 
     def step(
         self, position_m: float, velocity_m_s: float, command: float, disturbance: float = 0.0
     ) -> tuple[float, float]:
         """Position and velocity one period later, exact to rounding."""
-        force = command - self._offset - disturbance
-        if velocity_m_s > 0.0:
-            decay, travel, speed_gain, travel_gain, friction = self._forward
-        elif velocity_m_s < 0.0:
-            decay, travel, speed_gain, travel_gain, friction = self._backward
-        elif velocity_m_s == 0.0:
-            return self._step_from_rest(position_m, force)
+        return coulomb_step(self.constants, position_m, velocity_m_s, command, disturbance)
+
+
+class SlidingSide(NamedTuple):
+    """Friction in one direction, as the change of speed over a sub-step."""
+
+    damping: float
+    level: float
+    excess: float
+    speed_m_s: float
+    power: float
+
+
+class StribeckConstants(NamedTuple):
+    """What `stribeck_step` knows of an axis and its sub-step."""
+
+    forward: SlidingSide
+    backward: SlidingSide
+    substeps: int
+    step_s: float
+    gain: float
+    offset: float
+    ripple: float
+    pitch_m: float
+
+
+def _sliding_side(axis: Axis, gain: float) -> SlidingSide:
+    excess = gain * max(0.0, axis.static_friction - axis.coulomb_friction)
+    speed_m_s = axis.stribeck_speed_m_s if excess > 0.0 else 0.0
+    damping, level = 1.0 + gain * axis.viscous_friction, gain * axis.coulomb_friction
+    return SlidingSide(damping, level, excess, speed_m_s, axis.stribeck_power)
+
+
+def stribeck_step(
+    plant: StribeckConstants,
+    position_m: float,
+    velocity_m_s: float,
+    command: float,
+    disturbance: float,
+) -> tuple[float, float]:
+    """Position and velocity one period later; see `StribeckPlant`."""
+    gain, half_s, ripple = plant.gain, 0.5 * plant.step_s, plant.ripple
+    force = command - plant.offset - disturbance
+    for _ in range(plant.substeps):
+        push = force
+        if ripple != 0.0:
+            push = force - ripple * math.sin(2.0 * math.pi * position_m / plant.pitch_m)
+        impulse = velocity_m_s + gain * push
+        side = plant.forward if impulse > 0.0 else plant.backward
+        hold = _hold(side, velocity_m_s if velocity_m_s >= 0.0 else -velocity_m_s)
+        if impulse > hold:
+            next_m_s = (impulse - hold) / side.damping
+        elif impulse < -hold:
+            next_m_s = (impulse + hold) / side.damping
         else:
-            return math.nan, math.nan
-        net = force - friction
-        end_m_s = decay * velocity_m_s + speed_gain * net
-        if (end_m_s < 0.0) if velocity_m_s > 0.0 else (end_m_s > 0.0):
-            return self._step_through_rest(position_m, velocity_m_s, force)
-        return position_m + travel * velocity_m_s + travel_gain * net, end_m_s
+            next_m_s = 0.0 if impulse == impulse else impulse
+        position_m += half_s * (velocity_m_s + next_m_s)
+        velocity_m_s = next_m_s
+    return position_m, velocity_m_s
 
-    def _holds(self, force: float) -> bool:
-        return -self._static[1] <= force <= self._static[0]
 
-    def _step_from_rest(self, position_m: float, force: float) -> tuple[float, float]:
-        if self._holds(force):
-            return position_m, 0.0
-        _, _, speed_gain, travel_gain, friction = self._forward if force > 0.0 else self._backward
-        net = force - friction
-        return position_m + travel_gain * net, speed_gain * net
-
-    def _step_through_rest(
-        self, position_m: float, velocity_m_s: float, force: float
-    ) -> tuple[float, float]:
-        side = 0 if velocity_m_s > 0.0 else 1
-        viscous = self._viscous[side]
-        pull = force - self._coulomb[side] - viscous * velocity_m_s
-        share = viscous * velocity_m_s / pull
-        stop_s = -velocity_m_s * self._inertia / pull * _log_slope(share)
-        stop_s = min(max(stop_s, 0.0), self._period_s)
-        position_m, _ = self._glide(position_m, velocity_m_s, pull, stop_s, viscous)
-        if self._holds(force):
-            return position_m, 0.0
-        side = 0 if force > 0.0 else 1
-        rest_s = self._period_s - stop_s
-        pull = force - self._coulomb[side]
-        return self._glide(position_m, 0.0, pull, rest_s, self._viscous[side])
-
-    def _glide(
-        self, position_m: float, velocity_m_s: float, pull: float, time_s: float, viscous: float
-    ) -> tuple[float, float]:
-        """`pull` is inertia times the acceleration at the start."""
-        exponent = viscous * time_s / self._inertia
-        start_m_s2 = pull / self._inertia
-        position_m += velocity_m_s * time_s
-        position_m += start_m_s2 * time_s * time_s * _mean_travel(exponent)
-        return position_m, velocity_m_s + start_m_s2 * time_s * _mean_decay(exponent)
+def _hold(side: SlidingSide, speed_m_s: float) -> float:
+    """Gain times `sliding_friction`; beyond 40 Stribeck speeds nothing of the rise is left."""
+    if side.speed_m_s == 0.0:
+        return side.level
+    if side.power == 1.0:
+        if speed_m_s >= 40.0 * side.speed_m_s:
+            return side.level
+        return side.level + side.excess * exponential(-speed_m_s / side.speed_m_s)
+    return side.level + side.excess * stribeck_rise(speed_m_s / side.speed_m_s, side.power)
 
 
 class StribeckPlant:
@@ -117,63 +229,25 @@ class StribeckPlant:
     so the step is stable for any friction. `ripple` depends on the position.
     """
 
+    kernel = staticmethod(stribeck_step)
+
     def __init__(
         self, axis: Axis, period_s: float, substeps: int = 0, ripple: Ripple | None = None
     ) -> None:
-        self._substeps = substeps or max(1, round(period_s / 1e-3))
-        self._step_s = period_s / self._substeps
-        self._gain, self._offset = self._step_s / axis.inertia, axis.offset
-        self._forward = _SlidingSide(axis, self._gain)
-        self._backward = _SlidingSide(backward_axis(axis), self._gain)
-        self._ripple = ripple
+        substeps = substeps or max(1, round(period_s / 1e-3))
+        step_s = period_s / substeps
+        gain = step_s / axis.inertia
+        sides = (_sliding_side(axis, gain), _sliding_side(backward_axis(axis), gain))
+        wave = ripple or Ripple(0.0, 1.0)
+        self.constants = StribeckConstants(
+            *sides, substeps, step_s, gain, axis.offset, wave.amplitude, wave.pitch_m
+        )
 
     def step(
         self, position_m: float, velocity_m_s: float, command: float, disturbance: float = 0.0
     ) -> tuple[float, float]:
         """Position and velocity one period later; error of the order of the sub-step."""
-        gain, half_s, ripple = self._gain, 0.5 * self._step_s, self._ripple
-        force = command - self._offset - disturbance
-        for _ in range(self._substeps):
-            push = force if ripple is None else force - self._ripple_force(position_m)
-            impulse = velocity_m_s + gain * push
-            side = self._forward if impulse > 0.0 else self._backward
-            hold = side.hold(velocity_m_s if velocity_m_s >= 0.0 else -velocity_m_s)
-            if impulse > hold:
-                next_m_s = (impulse - hold) / side.damping
-            elif impulse < -hold:
-                next_m_s = (impulse + hold) / side.damping
-            else:
-                next_m_s = 0.0 if impulse == impulse else impulse
-            position_m += half_s * (velocity_m_s + next_m_s)
-            velocity_m_s = next_m_s
-        return position_m, velocity_m_s
-
-    def _ripple_force(self, position_m: float) -> float:
-        if self._ripple is None:
-            return 0.0
-        return self._ripple.amplitude * math.sin(2.0 * math.pi * position_m / self._ripple.pitch_m)
-
-
-class _SlidingSide:
-    """Friction in one direction, as the change of speed over a sub-step."""
-
-    def __init__(self, axis: Axis, gain: float) -> None:
-        self.damping = 1.0 + gain * axis.viscous_friction
-        self._axis, self._gain = axis, gain
-        self._level = gain * axis.coulomb_friction
-        self._excess = gain * max(0.0, axis.static_friction - axis.coulomb_friction)
-        rises = self._excess > 0.0 and axis.stribeck_speed_m_s > 0.0
-        self._speed_m_s = axis.stribeck_speed_m_s
-        self._far_m_s = 40.0 * self._speed_m_s if rises and axis.stribeck_power == 1.0 else 0.0
-        self._general = rises and axis.stribeck_power != 1.0
-
-    def hold(self, speed_m_s: float) -> float:
-        """Gain times `sliding_friction`; beyond 40 Stribeck speeds nothing of the rise is left."""
-        if speed_m_s < self._far_m_s:
-            return self._level + self._excess * exponential(-speed_m_s / self._speed_m_s)
-        if self._general:
-            return self._gain * sliding_friction(self._axis, speed_m_s)
-        return self._level
+        return stribeck_step(self.constants, position_m, velocity_m_s, command, disturbance)
 
 
 def make_plant(axis: Axis, period_s: float) -> CoulombPlant | StribeckPlant:

@@ -41,15 +41,20 @@ def sliding_friction(axis: Axis, speed_m_s: float) -> float:
     """Eq. 2 without the viscous part, at `speed_m_s` >= 0, in the axis' command unit."""
     if axis.stribeck_speed_m_s <= 0.0:
         return axis.coulomb_friction
-    ratio = speed_m_s / axis.stribeck_speed_m_s
-    if ratio > 1e3:
-        return axis.coulomb_friction
-    if axis.stribeck_power == 2.0:
-        ratio = ratio * ratio
-    elif axis.stribeck_power != 1.0 and ratio > 0.0:
-        ratio = exponential(axis.stribeck_power * log_one_plus(ratio - 1.0))
+    rise = stribeck_rise(speed_m_s / axis.stribeck_speed_m_s, axis.stribeck_power)
     excess = max(axis.static_friction, axis.coulomb_friction) - axis.coulomb_friction
-    return axis.coulomb_friction + excess * exponential(-ratio)
+    return axis.coulomb_friction + excess * rise
+
+
+def stribeck_rise(ratio: float, power: float) -> float:
+    """Share of the rise towards rest that is left at `ratio` >= 0 Stribeck speeds."""
+    if ratio > 1e3:
+        return 0.0
+    if power == 2.0:
+        ratio = ratio * ratio
+    elif power != 1.0 and ratio > 0.0:
+        ratio = exponential(power * log_one_plus(ratio - 1.0))
+    return exponential(-ratio)
 
 
 def smallest_dead_zone_m_s(axis: Axis) -> float:

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from seamlog.analysis.deterministic import exponential
 from seamlog.contracts import Axis
 
-from .feed_forward import DeadZone, feed_forward
+from .feed_forward import NOTHING_KNOWN, DeadZone, feed_forward, known_of
 from .sent import SentCommands
 
 
@@ -53,6 +53,8 @@ class ADRC:
         self._kp = config.bandwidth_1_s * config.bandwidth_1_s
         self._kd = 2.0 * config.damping * config.bandwidth_1_s
         self._sent = SentCommands(axis)
+        model = known_of(axis, config.dead_zone_m_s)
+        self._model = model if config.feed_forward else NOTHING_KNOWN
         self._known = [0.0] * (axis.delay_periods + 1)
         self._observed: tuple[float, float, float] | None = None
         self._state = (0.0,) * 6
@@ -83,9 +85,7 @@ class ADRC:
         return wanted
 
     def _friction(self, speed_m_s: float) -> float:
-        if not self._config.feed_forward:
-            return 0.0
-        return feed_forward(self._axis, self._config.dead_zone_m_s, speed_m_s, 0.0)
+        return feed_forward(self._model, speed_m_s, 0.0)
 
     def _observe(self, position_m: float, velocity_m_s: float) -> tuple[float, float, float]:
         acted = self._sent.arrive() - self._known.pop(0)

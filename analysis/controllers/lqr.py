@@ -6,7 +6,7 @@ from seamlog.analysis.dynamics import held_motion
 from seamlog.contracts import Axis
 from seamlog.errors import UsageError
 
-from .feed_forward import DeadZone, feed_forward
+from .feed_forward import DeadZone, feed_forward, known_of
 from .pid import integral_bound
 from .riccati import regulator_gains
 
@@ -52,6 +52,7 @@ class LQR:
         self.gains = tuple(gains)
         self._waiting = [0.0] * axis.delay_periods
         self._bound = config.integral_limit or integral_bound(axis)
+        self._known = known_of(axis, config.dead_zone_m_s)
         self._integral = 0.0
         self._state = (0.0,) * 5
 
@@ -71,7 +72,7 @@ class LQR:
             feedback += weight * sent
         integral = min(max(self._integral, -self._bound), self._bound)
         self._integral = integral + integral_gain * self._period_s * error_m
-        known = feed_forward(self._axis, self._config.dead_zone_m_s, reference_m_s, reference_m_s2)
+        known = feed_forward(self._known, reference_m_s, reference_m_s2)
         if self._waiting:
             self._waiting = [*self._waiting[1:], feedback + integral]
         self._state = (error_m, error_m_s, known, integral, feedback)

@@ -13,7 +13,7 @@ from seamlog.analysis.dynamics import CoulombPlant, held_motion
 from seamlog.contracts import Axis
 from seamlog.errors import HardwareError, PluginFailed
 
-from .feed_forward import DeadZone, feed_forward
+from .feed_forward import DeadZone, feed_forward, known_of
 from .sent import SentCommands
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ class MPC:
 
     def __init__(self, config: MPCConfig, axis: Axis, period_s: float) -> None:
         self._config, self._axis, self._period_s = config, axis, period_s
+        self._model = known_of(axis, config.dead_zone_m_s)
         self._plant, self._sent = CoulombPlant(axis, period_s), SentCommands(axis)
         self._limit = min(axis.saturation, config.command_limit or axis.saturation)
         self._state = (0.0,) * 5
@@ -83,14 +84,10 @@ class MPC:
         return wanted
 
     def _known(self, speed_m_s: float, reference_m_s2: float) -> "NDArray[np.float64]":
-        alpha, period = self._config.dead_zone_m_s, self._period_s
+        step_m_s = self._period_s * reference_m_s2
+        periods = range(self._config.horizon_periods)
         return np.array(
-            [
-                feed_forward(
-                    self._axis, alpha, speed_m_s + k * period * reference_m_s2, reference_m_s2
-                )
-                for k in range(self._config.horizon_periods)
-            ]
+            [feed_forward(self._model, speed_m_s + k * step_m_s, reference_m_s2) for k in periods]
         )
 
     def _plan(

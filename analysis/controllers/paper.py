@@ -14,6 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from seamlog.analysis.friction import friction_shape, smallest_dead_zone_m_s
 from seamlog.contracts import Axis
 
+from .law import LawController, Memory
+
 
 class PaperConfig(BaseModel):
     """Tuning of the paper's law; lengths in m, times in s, forces in the axis' command unit."""
@@ -35,10 +37,39 @@ class PaperConfig(BaseModel):
     """Speed at which friction is compensated; the paper takes the measured one."""
 
 
-class PaperController:
+PaperGains = tuple[float, float, float, float, float, float, float, float, float, bool]
+"""What eq. 12 multiplies with, in the order in which `paper_law` unpacks it."""
+
+
+def paper_law(
+    gains: PaperGains,
+    memory: Memory,
+    reference_m: float,
+    reference_m_s: float,
+    reference_m_s2: float,
+    position_m: float,
+    velocity_m_s: float,
+) -> tuple[float, Memory]:
+    """Eq. 12, before saturation."""
+    inertia, viscous, coulomb, reach, slope, damping, stiffness, layer, alpha, on_reference = gains
+    error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
+    approach = error_m_s + slope * error_m
+    speed = reference_m_s if on_reference else velocity_m_s
+    friction = viscous * speed
+    friction += coulomb * friction_shape(speed, alpha)
+    wanted_m_s2 = reference_m_s2 + damping * error_m_s + stiffness * error_m
+    tracking = inertia * wanted_m_s2
+    ratio = approach / layer
+    switching = reach * (1.0 if ratio > 1.0 else -1.0 if ratio < -1.0 else ratio)
+    memory = (-approach, error_m, error_m_s, friction, tracking, switching)
+    return friction + tracking + switching, memory
+
+
+class PaperController(LawController):
     """Eq. 12 with the parameters of `axis`, or those that `adapt` has set since."""
 
     Config = PaperConfig
+    law = staticmethod(paper_law)
     state_names = (
         "sliding_surface_m_s",
         "tracking_error_m",
@@ -49,47 +80,21 @@ class PaperController:
     )
 
     def __init__(self, config: PaperConfig, axis: Axis, period_s: float) -> None:
-        self._config, self._axis, self._period_s = config, axis, period_s
+        self._config = config
         static = max(axis.static_friction, axis.coulomb_friction)
         self._gain = static if config.gain is None else config.gain
-        self._slope, self._layer = config.surface_slope, config.boundary_layer
-        self._dead_zone_m_s = config.dead_zone_m_s
-        self._damping = config.surface_slope * (2.0 if config.form == "right" else 1.0)
-        self._stiffness = config.surface_slope * config.surface_slope
+        slope = config.surface_slope
+        damping = slope * (2.0 if config.form == "right" else 1.0)
         self._on_reference = config.friction_speed == "reference"
-        self._state = (0.0,) * 6
+        shape = (config.boundary_layer, config.dead_zone_m_s, self._on_reference)
+        self._tuning = (slope, damping, slope * slope, *shape)
+        super().__init__(axis, period_s, None)
         self.adapt(axis.inertia, axis.viscous_friction, axis.coulomb_friction)
 
     def adapt(self, inertia: float, viscous_friction: float, coulomb_friction: float) -> None:
         """Take new plant parameters, as a self-tuning loop does each period."""
-        self._inertia = inertia
-        self._viscous, self._coulomb = viscous_friction, coulomb_friction
-        self._switching = inertia * self._config.reach_rate + self._gain
-
-    def output(
-        self,
-        reference_m: float,
-        reference_m_s: float,
-        reference_m_s2: float,
-        position_m: float,
-        velocity_m_s: float,
-    ) -> float:
-        """Eq. 12, before saturation."""
-        error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
-        approach = error_m_s + self._slope * error_m
-        speed = reference_m_s if self._on_reference else velocity_m_s
-        friction = self._viscous * speed
-        friction += self._coulomb * friction_shape(speed, self._dead_zone_m_s)
-        wanted_m_s2 = reference_m_s2 + self._damping * error_m_s + self._stiffness * error_m
-        tracking = self._inertia * wanted_m_s2
-        ratio = approach / self._layer
-        switching = self._switching * (1.0 if ratio > 1.0 else -1.0 if ratio < -1.0 else ratio)
-        self._state = (-approach, error_m, error_m_s, friction, tracking, switching)
-        return friction + tracking + switching
-
-    def state(self) -> tuple[float, ...]:
-        """Values in the order of `state_names`."""
-        return self._state
+        switching = inertia * self._config.reach_rate + self._gain
+        self.gains = (inertia, viscous_friction, coulomb_friction, switching, *self._tuning)
 
     def warnings(self) -> list[str]:
         """Limits that this tuning breaks on this axis, each named with its numbers."""
@@ -105,7 +110,8 @@ class PaperController:
                 f"surface_slope x lag = {config.surface_slope * lag_s:.3g} is not below {bound}: "
                 f"with half a period and {self._axis.delay_periods} of delay the loop is unstable"
             )
-        layer_rate = self._switching / (self._inertia * config.boundary_layer)
+        inertia, _, _, reach, *_ = self.gains
+        layer_rate = reach / (inertia * config.boundary_layer)
         if (2.0 * config.surface_slope + layer_rate) * lag_s >= 0.6:
             found.append(
                 f"(2 surface_slope + {layer_rate:.3g} 1/s in the layer) x lag = "

@@ -1,10 +1,13 @@
 """Proportional-derivative control, the baseline; with feed-forward it is computed torque."""
 
+from typing import NamedTuple
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from seamlog.contracts import Axis
 
-from .feed_forward import DeadZone, feed_forward
+from .feed_forward import NOTHING_KNOWN, DeadZone, FeedForward, feed_forward, known_of
+from .law import LawController, Memory
 from .stability import loop_radius, unstable_warning
 
 
@@ -22,10 +25,35 @@ class PDConfig(BaseModel):
     dead_zone_m_s: float = DeadZone
 
 
-class PD:
+class PDGains(NamedTuple):
+    """Feedback, and what the model adds (all 0 without feed-forward)."""
+
+    kp: float
+    kd: float
+    known: FeedForward
+
+
+def pd_law(
+    gains: PDGains,
+    memory: Memory,
+    reference_m: float,
+    reference_m_s: float,
+    reference_m_s2: float,
+    position_m: float,
+    velocity_m_s: float,
+) -> tuple[float, Memory]:
+    """Command before saturation; see `PD`."""
+    error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
+    feedback = gains.kp * error_m + gains.kd * error_m_s
+    known = feed_forward(gains.known, reference_m_s, reference_m_s2)
+    return feedback + known, (error_m, error_m_s, feedback, known)
+
+
+class PD(LawController):
     """u = kp e + kd e' (+ a a_d + b v_d + C s(v_d))."""
 
     Config = PDConfig
+    law = staticmethod(pd_law)
     state_names = (
         "tracking_error_m",
         "tracking_error_m_s",
@@ -34,34 +62,10 @@ class PD:
     )
 
     def __init__(self, config: PDConfig, axis: Axis, period_s: float) -> None:
-        self._config, self._axis, self._period_s = config, axis, period_s
         self._kp = 16.0 * axis.inertia if config.kp is None else config.kp
         self._kd = 8.0 * axis.inertia if config.kd is None else config.kd
-        self._state = (0.0,) * 4
-
-    def output(
-        self,
-        reference_m: float,
-        reference_m_s: float,
-        reference_m_s2: float,
-        position_m: float,
-        velocity_m_s: float,
-    ) -> float:
-        """Command before saturation."""
-        error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
-        feedback = self._kp * error_m + self._kd * error_m_s
-        known = self._feed_forward(reference_m_s, reference_m_s2)
-        self._state = (error_m, error_m_s, feedback, known)
-        return feedback + known
-
-    def _feed_forward(self, reference_m_s: float, reference_m_s2: float) -> float:
-        if not self._config.feed_forward:
-            return 0.0
-        return feed_forward(self._axis, self._config.dead_zone_m_s, reference_m_s, reference_m_s2)
-
-    def state(self) -> tuple[float, ...]:
-        """Values in the order of `state_names`."""
-        return self._state
+        known = known_of(axis, config.dead_zone_m_s) if config.feed_forward else NOTHING_KNOWN
+        super().__init__(axis, period_s, PDGains(self._kp, self._kd, known))
 
     def warnings(self) -> list[str]:
         """Whether these gains make the linear loop unstable."""

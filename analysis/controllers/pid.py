@@ -1,10 +1,13 @@
 """Proportional-integral-derivative control with a bounded integral and optional feed-forward."""
 
+from typing import NamedTuple
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from seamlog.contracts import Axis
 
-from .feed_forward import DeadZone, feed_forward
+from .feed_forward import NOTHING_KNOWN, DeadZone, FeedForward, feed_forward, known_of
+from .law import LawController, Memory
 from .stability import loop_radius, unstable_warning
 
 
@@ -26,10 +29,39 @@ class PIDConfig(BaseModel):
     dead_zone_m_s: float = DeadZone
 
 
-class PID:
+class PIDGains(NamedTuple):
+    """Feedback with ki a period, the bound of its integral, and what the model adds."""
+
+    kp: float
+    ki_period: float
+    kd: float
+    bound: float
+    known: FeedForward
+
+
+def pid_law(
+    gains: PIDGains,
+    memory: Memory,
+    reference_m: float,
+    reference_m_s: float,
+    reference_m_s2: float,
+    position_m: float,
+    velocity_m_s: float,
+) -> tuple[float, Memory]:
+    """Command before saturation; see `PID`. The integral is the fourth value of the memory."""
+    error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
+    integral = memory[3] + gains.ki_period * error_m
+    integral = min(max(integral, -gains.bound), gains.bound)
+    feedback = gains.kp * error_m + gains.kd * error_m_s
+    known = feed_forward(gains.known, reference_m_s, reference_m_s2)
+    return feedback + integral + known, (error_m, error_m_s, feedback, integral, known)
+
+
+class PID(LawController):
     """u = kp e + kd e' + I (+ a a_d + b v_d + C s(v_d)), I the sum of ki e T, bounded."""
 
     Config = PIDConfig
+    law = staticmethod(pid_law)
     state_names = (
         "tracking_error_m",
         "tracking_error_m_s",
@@ -39,37 +71,14 @@ class PID:
     )
 
     def __init__(self, config: PIDConfig, axis: Axis, period_s: float) -> None:
-        self._config, self._axis, self._period_s = config, axis, period_s
+        self._config = config
         self._kp = 16.0 * axis.inertia if config.kp is None else config.kp
         self._ki = 8.0 * axis.inertia if config.ki is None else config.ki
         self._kd = 8.0 * axis.inertia if config.kd is None else config.kd
         self._bound = config.integral_limit or integral_bound(axis)
-        self._integral = 0.0
-        self._state = (0.0,) * 5
-
-    def output(
-        self,
-        reference_m: float,
-        reference_m_s: float,
-        reference_m_s2: float,
-        position_m: float,
-        velocity_m_s: float,
-    ) -> float:
-        """Command before saturation."""
-        error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
-        integral = self._integral + self._ki * error_m * self._period_s
-        self._integral = integral = min(max(integral, -self._bound), self._bound)
-        feedback = self._kp * error_m + self._kd * error_m_s
-        known = 0.0
-        if self._config.feed_forward:
-            alpha = self._config.dead_zone_m_s
-            known = feed_forward(self._axis, alpha, reference_m_s, reference_m_s2)
-        self._state = (error_m, error_m_s, feedback, integral, known)
-        return feedback + integral + known
-
-    def state(self) -> tuple[float, ...]:
-        """Values in the order of `state_names`."""
-        return self._state
+        known = known_of(axis, config.dead_zone_m_s) if config.feed_forward else NOTHING_KNOWN
+        gains = PIDGains(self._kp, self._ki * period_s, self._kd, self._bound, known)
+        super().__init__(axis, period_s, gains)
 
     def warnings(self) -> list[str]:
         """Whether the linear loop is unstable or the integral cannot overcome friction."""

@@ -5,11 +5,14 @@ chatters about S = 0 instead of staying there.
 """
 
 import math
+from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from seamlog.analysis.friction import friction_shape, smallest_dead_zone_m_s
 from seamlog.contracts import Axis
+
+from .law import LawController, Memory
 
 
 class SignConfig(BaseModel):
@@ -27,10 +30,44 @@ class SignConfig(BaseModel):
     """alpha of the friction shape."""
 
 
-class SignController:
+class SignGains(NamedTuple):
+    """What eq. 10 multiplies with; `switching` is a eta + K."""
+
+    inertia: float
+    viscous: float
+    coulomb: float
+    switching: float
+    slope: float
+    reach_rate: float
+    dead_zone_m_s: float
+
+
+def sign_law(
+    gains: SignGains,
+    memory: Memory,
+    reference_m: float,
+    reference_m_s: float,
+    reference_m_s2: float,
+    position_m: float,
+    velocity_m_s: float,
+) -> tuple[float, Memory]:
+    """Eq. 10, before saturation."""
+    error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
+    approach = error_m_s + gains.slope * error_m
+    friction = gains.viscous * velocity_m_s
+    friction += gains.coulomb * friction_shape(velocity_m_s, gains.dead_zone_m_s)
+    tracking = gains.inertia * (reference_m_s2 + gains.slope * error_m_s)
+    switching = math.copysign(gains.switching, approach) if approach != 0.0 else 0.0
+    reach_s = abs(approach) / gains.reach_rate if gains.reach_rate > 0.0 else math.inf
+    memory = (-approach, error_m, error_m_s, friction, tracking, switching, reach_s)
+    return friction + tracking + switching, memory
+
+
+class SignController(LawController):
     """u = b v + C s(v) + a (a_d + lambda e') + (a eta + K) sgn(e' + lambda e)."""
 
     Config = SignConfig
+    law = staticmethod(sign_law)
     state_names = (
         "sliding_surface_m_s",
         "tracking_error_m",
@@ -42,35 +79,20 @@ class SignController:
     )
 
     def __init__(self, config: SignConfig, axis: Axis, period_s: float) -> None:
-        self._config, self._axis, self._period_s = config, axis, period_s
+        self._config = config
         self._hold = max(axis.static_friction, axis.coulomb_friction)
         self._gain = self._hold if config.gain is None else config.gain
         self._switching = axis.inertia * config.reach_rate + self._gain
-        self._state = (0.0,) * 7
-
-    def output(
-        self,
-        reference_m: float,
-        reference_m_s: float,
-        reference_m_s2: float,
-        position_m: float,
-        velocity_m_s: float,
-    ) -> float:
-        """Eq. 10, before saturation."""
-        config, axis = self._config, self._axis
-        error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
-        approach = error_m_s + config.surface_slope * error_m
-        friction = axis.viscous_friction * velocity_m_s
-        friction += axis.coulomb_friction * friction_shape(velocity_m_s, config.dead_zone_m_s)
-        tracking = axis.inertia * (reference_m_s2 + config.surface_slope * error_m_s)
-        switching = math.copysign(self._switching, approach) if approach != 0.0 else 0.0
-        reach_s = abs(approach) / config.reach_rate if config.reach_rate > 0.0 else math.inf
-        self._state = (-approach, error_m, error_m_s, friction, tracking, switching, reach_s)
-        return friction + tracking + switching
-
-    def state(self) -> tuple[float, ...]:
-        """Values in the order of `state_names`."""
-        return self._state
+        gains = SignGains(
+            axis.inertia,
+            axis.viscous_friction,
+            axis.coulomb_friction,
+            self._switching,
+            config.surface_slope,
+            config.reach_rate,
+            config.dead_zone_m_s,
+        )
+        super().__init__(axis, period_s, gains)
 
     def warnings(self) -> list[str]:
         """Limits that this tuning breaks on this axis; without a layer it always chatters."""

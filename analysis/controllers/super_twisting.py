@@ -1,12 +1,14 @@
 """Super-twisting: second-order sliding mode, whose command is continuous."""
 
 import math
+from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from seamlog.contracts import Axis
 
-from .feed_forward import DeadZone, feed_forward
+from .feed_forward import DeadZone, FeedForward, feed_forward, known_of
+from .law import LawController, Memory
 from .pid import integral_bound
 from .stability import loop_radius, unstable_warning
 
@@ -29,13 +31,48 @@ class SuperTwistingConfig(BaseModel):
     dead_zone_m_s: float = DeadZone
 
 
-class SuperTwisting:
+class SuperTwistingGains(NamedTuple):
+    """What the law multiplies with; `rate_period` is k2 times the period, `damping` a lambda."""
+
+    slope: float
+    damping: float
+    root: float
+    rate_period: float
+    layer: float
+    bound: float
+    known: FeedForward
+
+
+def super_twisting_law(
+    gains: SuperTwistingGains,
+    memory: Memory,
+    reference_m: float,
+    reference_m_s: float,
+    reference_m_s2: float,
+    position_m: float,
+    velocity_m_s: float,
+) -> tuple[float, Memory]:
+    """Command before saturation; see `SuperTwisting`. The integral w is last in the memory."""
+    error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
+    approach = error_m_s + gains.slope * error_m
+    ratio = min(max(approach / gains.layer, -1.0), 1.0)
+    integral = memory[6] + gains.rate_period * ratio
+    integral = min(max(integral, -gains.bound), gains.bound)
+    known = feed_forward(gains.known, reference_m_s, reference_m_s2)
+    damping = gains.damping * error_m_s
+    switching = gains.root * math.sqrt(abs(approach)) * ratio
+    memory = (-approach, error_m, error_m_s, known, damping, switching, integral)
+    return known + damping + switching + integral, memory
+
+
+class SuperTwisting(LawController):
     """u = a (a_d + lambda e') + b v_d + C s(v_d) + k1 |s|^(1/2) sat(s / layer) + w.
 
     s = e' + lambda e; w' = k2 sgn(s), linear within the layer, w bounded.
     """
 
     Config = SuperTwistingConfig
+    law = staticmethod(super_twisting_law)
     state_names = (
         "sliding_surface_m_s",
         "tracking_error_m",
@@ -47,38 +84,21 @@ class SuperTwisting:
     )
 
     def __init__(self, config: SuperTwistingConfig, axis: Axis, period_s: float) -> None:
-        self._config, self._axis, self._period_s = config, axis, period_s
+        self._config = config
         hold = max(axis.static_friction, axis.coulomb_friction)
         self._root = axis.inertia if config.root_gain is None else config.root_gain
         self._rate = 0.1 * hold if config.integral_gain is None else config.integral_gain
         self._bound = config.integral_limit or integral_bound(axis)
-        self._integral = 0.0
-        self._state = (0.0,) * 7
-
-    def output(
-        self,
-        reference_m: float,
-        reference_m_s: float,
-        reference_m_s2: float,
-        position_m: float,
-        velocity_m_s: float,
-    ) -> float:
-        """Command before saturation."""
-        config, axis = self._config, self._axis
-        error_m, error_m_s = reference_m - position_m, reference_m_s - velocity_m_s
-        approach = error_m_s + config.surface_slope * error_m
-        ratio = min(max(approach / config.boundary_layer, -1.0), 1.0)
-        integral = self._integral + self._rate * self._period_s * ratio
-        self._integral = integral = min(max(integral, -self._bound), self._bound)
-        known = feed_forward(axis, config.dead_zone_m_s, reference_m_s, reference_m_s2)
-        damping = axis.inertia * config.surface_slope * error_m_s
-        switching = self._root * math.sqrt(abs(approach)) * ratio
-        self._state = (-approach, error_m, error_m_s, known, damping, switching, integral)
-        return known + damping + switching + integral
-
-    def state(self) -> tuple[float, ...]:
-        """Values in the order of `state_names`."""
-        return self._state
+        gains = SuperTwistingGains(
+            config.surface_slope,
+            axis.inertia * config.surface_slope,
+            self._root,
+            self._rate * period_s,
+            config.boundary_layer,
+            self._bound,
+            known_of(axis, config.dead_zone_m_s),
+        )
+        super().__init__(axis, period_s, gains)
 
     def warnings(self) -> list[str]:
         """Whether the edge of the layer, where both switches are steepest, is unstable."""

@@ -1,7 +1,7 @@
-"""Self-replay to the bit, with and without the extras of the processor.
+"""Self-replay to the bit, with and without the extras of the processor, with and without numba.
 
-numpy's SIMD and glibc's FMA variants are switched off in a second process; its commands,
-positions and estimates must hash as ours do.
+numpy's SIMD and glibc's FMA variants are switched off in a second process, which has no numba
+either; its commands, positions and estimates must hash as ours do.
 """
 
 import hashlib
@@ -73,6 +73,7 @@ def _recorded_reference() -> Reference:
 @pytest.fixture(scope="module")
 def plain(project: os.PathLike[str]) -> dict[str, str]:
     script = (
+        "import sys; sys.modules['numba'] = None\n"
         "from tests.analysis.controllers.test_bits import hashes\n"
         "print(*(f'{title}={value}' for title, value in hashes().items()), sep='\\n')"
     )
@@ -89,5 +90,7 @@ def plain(project: os.PathLike[str]) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("title", LAWS)
-def test_the_same_bits_without_the_processors_extras(plain: dict[str, str], title: str) -> None:
+def test_the_same_bits_without_the_processors_extras_and_numba(
+    plain: dict[str, str], title: str
+) -> None:
     assert plain[title] == _hash(*LAWS[title])
