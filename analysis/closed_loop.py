@@ -7,7 +7,9 @@ command arrives, `initial_command` acts.
 
 from array import array
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import floor
 
 import numpy as np
@@ -20,6 +22,7 @@ from .controllers.law import LawController
 from .dynamics import CoulombPlant, Plant, StribeckPlant, make_plant
 
 Floats = NDArray[np.float64]
+Step = Callable[..., tuple[float, float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +129,11 @@ def _run(
 
     `inputs` has the columns reference (3), noise of position and of velocity, disturbance.
     """
-    step, output, state = plant.step, controller.output, controller.state
+    output, state = controller.output, controller.state
+    step: Step = plant.step
+    if isinstance(plant, CoulombPlant | StribeckPlant):
+        kernel: Step = plant.kernel
+        step = partial(kernel, plant.constants)  # a call less per period
     position, velocity = start
     under_way = deque(waiting)
     send, arrive = under_way.append, under_way.popleft
