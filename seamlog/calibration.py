@@ -118,6 +118,8 @@ class PlaneCalibration(_Calibration):
     residual_mm: float = Field(ge=0)
     scale_relative_u: float = Field(ge=0)
     frame: Literal["plane", "table", "laser"] = "plane"
+    frame_u_mm: float = Field(0.0, ge=0)
+    """Standard uncertainty of places in the frame, where it is the table's."""
 
     @model_validator(mode="after")
     def _invertible(self) -> "PlaneCalibration":

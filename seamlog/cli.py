@@ -31,6 +31,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "replay": ("seamlog.analysis.commands.replay:replay", "Run logged inputs through code again."),
     "sweep": ("seamlog.analysis.commands.sweep:sweep", "Rank many tunings of controllers."),
     "bead": ("seamlog.analysis.commands.bead:bead", "Measure the bead on photos."),
+    "calibrate": ("seamlog.analysis.commands.calibrate:calibrate", "Pixels to millimetres."),
     "analyze": ("seamlog.analysis.commands.analyze:analyze", "Session and photos to results."),
     "report": ("seamlog.reports.commands:report", "Results to one HTML file."),
     "demo": ("seamlog.commands.demo:demo", "A virtual weld through the whole chain."),

@@ -1,0 +1,1 @@
+"""Calibration: photos of boards, rulers and known points to calibration files."""
