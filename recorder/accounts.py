@@ -1,7 +1,7 @@
 """The accounts of a recording: what was offered, what became of it, per channel.
 
-offered = accepted + dropped + refused, and accepted = written + lost + waiting, where waiting
-are those in the ring or in a chunk that is not written yet.
+offered = accepted + dropped + refused, and accepted = written + lost + discarded + waiting, where
+waiting are those in the ring or in a chunk that is not written yet. Only snapshot mode discards.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,9 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from .ring import (
+    DISCARDED,
     DROPPED,
+    DURABLE,
     FIRST_DROPPED,
     HIGH_WATER_PPM,
     LAST_DROPPED,
@@ -53,6 +55,10 @@ class Account:
     """Log time of the last sync to disk, 0 if there was none."""
     reason: str
     """Why the first message was turned away; empty if none was."""
+    durable: int = 0
+    """Messages that are synced to disk; of the written ones the first."""
+    discarded: int = 0
+    """Messages that were accepted and, in snapshot mode, belong to no snapshot."""
     longest_gap_s: float | None = None
     """Longest time between two messages in a row; None with fewer than two, or while running."""
 
@@ -64,7 +70,7 @@ class Account:
     @property
     def waiting(self) -> int:
         """Accepted messages on their way to the file."""
-        return self.accepted - self.written - self.lost
+        return self.accepted - self.written - self.lost - self.discarded
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +110,8 @@ def ring_account(topic: str, producer: str, ring: Ring, accepted: int) -> Accoun
         words[HIGH_WATER_PPM] / 1e6,
         int(words[LAST_SYNC_NS]),
         ring.reason,
+        int(words[DURABLE]),
+        int(words[DISCARDED]),
     )
 
 

@@ -4,7 +4,7 @@ import shutil
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from .folder import Recording
 from .intake import Intake
 from .journal import Journal
 from .mcap_writer import SessionFile, written_files
-from .ring import DROPPED, LAST_SYNC_NS
+from .ring import DROPPED, DURABLE, LAST_SYNC_NS, WRITTEN, Ring
 from .storage import SYNC_S
 from .varying_feed import VaryingFeed
 
@@ -26,6 +26,15 @@ _SPACE_FOR_S = 120.0
 _MOST_FINDINGS = 100
 _LAST_TRIES_S = 2.0
 """How long writing is tried again after the loop has ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Mark:
+    """A sync that was asked for: log time, and how much of each ring was written by then."""
+
+    number: int
+    time_ns: int
+    written: list[tuple[Ring, int]]
 
 
 class Engine:
@@ -43,16 +52,19 @@ class Engine:
         self._say = say
         self._findings: list[str] = []
         self._notes: deque[tuple[str, str]] = deque()
-        self._file = SessionFile(recording, folder, descriptor, self._fault, self._log_time_ns)
+        self._marks: deque[_Mark] = deque()
+        self._marked = 0
+        self._feeds: list[Feed] = []
+        self._file = SessionFile(recording, folder, descriptor, self._fault, self._mark)
         self._journal = Journal(self._file)
         self._intake = Intake(folder, self._file)
+        self._feeds = self._intake.feeds
         self._file.farewell = self._write_all_accounts
         self._sync_every_s = SYNC_S[recording.storage.sync]
         self._synced_s = self._status_s = time.monotonic()
         self._retry_s = 0.0
         self._failures = 0
         self._asked_size = 0
-        self._last_sync_ns = 0
         self._step_ns = self._wall_step_ns()
         self._dropped: dict[int, int] = {}
         self._explained: set[int] = set()
@@ -100,7 +112,7 @@ class Engine:
     def _step(self, now_s: float) -> bool:
         self._intake.take()
         busy = self._pump(now_s, flush=False)
-        urgent = [feed for feed in self._intake.feeds if _is_urgent(feed)]
+        urgent = [feed for feed in self._feeds if _is_urgent(feed)]
         if urgent:
             self._pump(now_s, flush=True)
         self._sync(now_s, at_once=bool(urgent))
@@ -117,9 +129,9 @@ class Engine:
         return busy
 
     def _pump(self, now_s: float, flush: bool) -> bool:
-        more = [feed.pump(now_s, flush) for feed in self._intake.feeds]
+        more = [feed.pump(now_s, flush) for feed in self._feeds]
         if flush:
-            for feed in self._intake.feeds:
+            for feed in self._feeds:
                 _calm(feed)
         return any(more)
 
@@ -133,11 +145,19 @@ class Engine:
             self._fault(trouble)
         self._note_sync()
 
+    def _mark(self) -> int:
+        """Note what is written at the moment when a sync is asked for."""
+        written = [(feed.ring, int(feed.ring.words[WRITTEN])) for feed in self._feeds]
+        self._marked += 1
+        self._marks.append(_Mark(self._marked, self._log_time_ns(), written))
+        return self._marked
+
     def _note_sync(self) -> None:
-        if self._file.done_mark > self._last_sync_ns:
-            self._last_sync_ns = self._file.done_mark
-            for feed in self._intake.feeds:
-                feed.ring.words[LAST_SYNC_NS] = self._last_sync_ns
+        """What was written when a sync was asked for that is done now is durable."""
+        while self._marks and self._marks[0].number <= self._file.done_mark:
+            mark = self._marks.popleft()
+            for ring, written in mark.written:
+                ring.words[DURABLE], ring.words[LAST_SYNC_NS] = written, mark.time_ns
 
     def _fault(self, finding: str) -> None:
         """Something is wrong with the files: tell the loop now, the log when it can be written."""
@@ -178,7 +198,7 @@ class Engine:
     def _note_gaps(self) -> None:
         """Accounts at the start of each run of drops, and the first reason of a channel."""
         rows = []
-        for feed in self._intake.feeds:
+        for feed in self._feeds:
             dropped = int(feed.ring.words[DROPPED])
             if dropped > self._dropped.get(feed.channel_id, 0):
                 rows.append(feed.account())
@@ -212,19 +232,16 @@ class Engine:
         """Log time now; where the clock is not ours to read, that of the newest message."""
         if self._recording.anchor_ns is not None:
             return time.monotonic_ns() + self._recording.anchor_ns
-        newest = (feed.gaps.newest_ns or 0 for feed in self._intake.feeds)
+        newest = (feed.gaps.newest_ns or 0 for feed in self._feeds)
         return max(newest, default=0) or self._recording.start_ns
 
     def _accounts(self) -> list[Account]:
-        return [
-            replace(feed.account(), longest_gap_s=feed.gaps.longest_s)
-            for feed in self._intake.feeds
-        ]
+        return [replace(feed.account(), longest_gap_s=feed.gaps.longest_s) for feed in self._feeds]
 
     def _write_status(self, rows: list[Account]) -> None:
         if self._recording.pace == "simulated":
-            # How full a ring was is the machine's doing; same seed, same messages.
-            rows = [replace(row, ring_high_water=0.0) for row in rows]
+            # Same seed, same messages: how full a ring was and when was synced is not of the seed.
+            rows = [replace(row, ring_high_water=0.0, last_sync_ns=0, durable=0) for row in rows]
             self._journal.status(rows, 0, self._log_time_ns())
         else:
             self._journal.status(rows, self._file.free_bytes(), self._log_time_ns())

@@ -60,4 +60,6 @@ def _status_values(account: Account, free_bytes: int) -> tuple[object, ...]:
         account.ring_high_water,
         account.last_sync_ns,
         free_bytes,
+        account.discarded,
+        account.durable,
     )

@@ -31,7 +31,7 @@ class SessionFile:
 
     After an `OSError` the message, attachment or record is in no file: do it again, and it goes
     into a new segment. `tell` takes findings in words, `farewell` writes the accounts that end
-    each segment, `now_ns` gives log time.
+    each segment, `mark` (> 0, growing) is asked at each sync and comes back in `done_mark`.
     """
 
     def __init__(
@@ -40,19 +40,20 @@ class SessionFile:
         folder: Path,
         descriptor: int,
         tell: Callable[[str], None] = lambda _: None,
-        now_ns: Callable[[], int] = lambda: 0,
+        mark: Callable[[], int] = lambda: 1,
     ) -> None:
         self._recording = recording
         self._storage = recording.storage
         self._rings = folder
         self._descriptor: int | None = descriptor
         self._tell = tell
-        self._now_ns = now_ns
+        self._mark = mark
         self.farewell: Callable[[], None] = lambda: None
         self._syncer = Syncer()
         self._channels: list[tuple[str, int, tuple[str, str], Mapping[str, str]]] = []
         self._metadata: list[tuple[str, Mapping[str, str]]] = []
         self._segment: Segment | None = None
+        self._unfinished: dict[Segment, OSError] = {}
         self._is_sealing = False
         self._removed_messages = 0
         self._opened = 0
@@ -117,7 +118,7 @@ class SessionFile:
     def request_sync(self) -> None:
         """Bring what is written by now to the disk, soon."""
         if self._segment is not None and not self._segment.is_doubtful:
-            self._syncer.sync(self._segment, self._now_ns())
+            self._syncer.sync(self._segment, self._mark())
 
     def watch(self) -> list[str]:
         """Troubles of syncing since the last look; a segment whose sync failed ends here."""
@@ -130,6 +131,10 @@ class SessionFile:
         """End the last segment and wait until all are on the disk; troubles in words."""
         if self._segment is not None:
             self._seal()
+        self._finish_the_rest()
+        for segment, error in self._unfinished.items():
+            self._tell(f"{segment.partial} could not be finished and keeps this name: {error}")
+            self._syncer.leave(segment)
         self._syncer.end()
         self._remove_stale()
         return self._syncer.take_troubles()
@@ -150,6 +155,7 @@ class SessionFile:
             self._segment = self._open()
             self._opened += 1
             self._introduce(self._segment)
+            self._finish_the_rest()
         return self._segment
 
     def _open(self) -> Segment:
@@ -224,16 +230,24 @@ class SessionFile:
         self._is_sealing = True
         with suppress(OSError):
             self.farewell()
-        try:
-            segment.finish()
-        except OSError as error:
-            self._tell(f"{segment.partial} could not be finished and keeps this name: {error}")
-            self._syncer.leave(segment)
-        else:
-            self._syncer.seal(segment, self._now_ns())
         self._is_sealing = False
         self._segment = None
         self.segments.append(segment)
+        self._finish(segment)
+
+    def _finish(self, segment: Segment) -> None:
+        try:
+            segment.finish()
+        except OSError as error:
+            self._unfinished[segment] = error
+        else:
+            self._syncer.seal(segment, self._mark())
+
+    def _finish_the_rest(self) -> None:
+        """Segments that could not be finished when the disk failed: it may work now."""
+        rest, self._unfinished = self._unfinished, {}
+        for segment in rest:
+            self._finish(segment)
 
     def _remove_oldest(self) -> bool:
         for segment in self.segments:

@@ -72,6 +72,7 @@ class Segment:
         self.is_named = False
         self.has_attachments = False
         self._force = force
+        self._is_torn = False
         self._file = open(descriptor, "wb", buffering=0)  # noqa: SIM115 - open to the end
         try:
             self._reserved = allocate(descriptor, 0, _LEAST_BYTES)
@@ -138,7 +139,10 @@ class Segment:
         self._reserved = max(self._reserved, 1 << 62)
 
     def finish(self) -> None:
-        """Write summary and footer and give back what was allocated behind them."""
+        """Write summary and footer and give back what was allocated behind them.
+
+        After an `OSError` it may be tried again.
+        """
         self.use_reserve()
         self._do(0, self._writer.finish, ())
         with suppress(OSError):
@@ -171,20 +175,24 @@ class Segment:
         self.partial.unlink(missing_ok=True)
 
     def _do(self, size: int, write: Callable[..., Any], values: tuple[Any, ...]) -> None:
+        if self._is_torn:
+            self._cut()
         end = self._writer.size + size + self._writer.summary_size + SPARE_BYTES
         if end > self._reserved:
             self._reserved = allocate(self.descriptor, self._reserved, end)
         try:
             write(*values)
         except OSError:
-            self._cut()
+            with suppress(OSError):
+                self._cut()
             raise
 
     def _cut(self) -> None:
         """Drop the torn record that a failed write left behind."""
-        with suppress(OSError):
-            os.ftruncate(self.descriptor, self._writer.size)
-            os.lseek(self.descriptor, self._writer.size, os.SEEK_SET)
+        self._is_torn = True
+        os.ftruncate(self.descriptor, self._writer.size)
+        os.lseek(self.descriptor, self._writer.size, os.SEEK_SET)
+        self._is_torn = False
 
 
 def allocate(descriptor: int, start: int, end: int) -> int:

@@ -208,7 +208,7 @@ _TABLE = (
         "the recorder's own accounts, one message per channel",
         Field("string", "topic", "", "channel the counts are of"),
         _u8("offered", "accepted + dropped + refused"),
-        _u8("accepted", "taken into the ring: written + lost + still in the ring"),
+        _u8("accepted", "taken into the ring: written + lost + discarded + still in the ring"),
         _u8("dropped", "turned away because the ring was full"),
         _u8("refused", "turned away because the message was not valid"),
         _u8("written", "in the file"),
@@ -218,6 +218,8 @@ _TABLE = (
         _f8("ring_high_water", "1", "largest filled fraction of the ring so far"),
         Field("int64", "last_sync_ns", "ns", "log time of the last sync to disk, 0 if none"),
         _u8("free_bytes", "free space of the file system that holds the session"),
+        _u8("discarded", "accepted and part of no snapshot; 0 but in snapshot mode"),
+        _u8("durable", "written and synced to disk, as far as was known then"),
     ),
 )
 

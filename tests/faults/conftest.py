@@ -1,0 +1,75 @@
+"""Fixtures of the fault programme."""
+
+import contextlib
+import os
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from seamlog.recorder import folder as rings
+from tests.faults.shim import Faults, compile_shim
+
+
+@pytest.fixture(scope="session")
+def shim(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The compiled shim."""
+    return compile_shim(tmp_path_factory.mktemp("shim"))
+
+
+@pytest.fixture
+def faults(shim: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Faults:
+    """Dials for the recorder processes that this test starts."""
+    dials = Faults(tmp_path / "faults")
+    monkeypatch.setenv("SEAMLOG_FAULTS", str(tmp_path / "faults"))
+    monkeypatch.setenv("LD_PRELOAD", str(shim))
+    return dials
+
+
+@pytest.fixture(autouse=True)
+def no_rings_left() -> Iterator[None]:
+    """Remove the rings that a test left behind on purpose."""
+    before = set(rings.root().iterdir())
+    yield
+    for folder in set(rings.root().iterdir()) - before:
+        if (folder / "recording.json").exists() and _is_ours(folder):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_ours(folder: Path) -> bool:
+    return "/pytest-" in rings.read_recording(folder).path and not is_locked(folder)
+
+
+def is_locked(folder: Path) -> bool:
+    """True while a process of the recording lives."""
+    import fcntl
+
+    with (folder / "lock").open("r+b") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False
+
+
+def mounted(folder: Path, *arguments: str) -> Iterator[Path]:
+    """Mount something for one test; skips where that is not allowed."""
+    if os.geteuid() != 0:
+        pytest.skip("mounting a small file system needs root")
+    folder.mkdir()
+    done = subprocess.run(["mount", *arguments, str(folder)], capture_output=True, text=True)
+    if done.returncode:
+        pytest.skip(f"no file system can be mounted here: {done.stderr.strip()}")
+    try:
+        yield folder
+    finally:
+        with contextlib.suppress(subprocess.CalledProcessError):
+            subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 12 MiB."""
+    yield from mounted(tmp_path / "small", "-t", "tmpfs", "-o", "size=12m", "none")
