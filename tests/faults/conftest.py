@@ -11,6 +11,7 @@ import pytest
 
 from seamlog.recorder import folder as rings
 from tests.faults.shim import Faults, compile_shim
+from tests.faults.telling import ROWS, Tell, tell
 
 
 @pytest.fixture(scope="session")
@@ -29,17 +30,13 @@ def faults(shim: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fault
 
 
 @pytest.fixture(autouse=True)
-def no_rings_left() -> Iterator[None]:
-    """Remove the rings that a test left behind on purpose."""
-    before = set(rings.root().iterdir())
+def no_rings_left(tmp_path: Path) -> Iterator[None]:
+    """Remove the rings that this test left behind on purpose."""
     yield
-    for folder in set(rings.root().iterdir()) - before:
-        if (folder / "recording.json").exists() and _is_ours(folder):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def _is_ours(folder: Path) -> bool:
-    return "/pytest-" in rings.read_recording(folder).path and not is_locked(folder)
+    for folder in rings.root().iterdir():
+        with contextlib.suppress(OSError):
+            if rings.read_recording(folder).path.startswith(f"{tmp_path}/"):
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def is_locked(folder: Path) -> bool:
@@ -73,3 +70,17 @@ def mounted(folder: Path, *arguments: str) -> Iterator[Path]:
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """A file system of 12 MiB."""
     yield from mounted(tmp_path / "small", "-t", "tmpfs", "-o", "size=12m", "none")
+
+
+@pytest.fixture(name="tell")
+def _tell() -> Tell:
+    """Print a figure at the end of the run."""
+    return tell
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """The figures of the long runs."""
+    if ROWS:
+        terminalreporter.section("figures of the fault programme")
+        for row in ROWS:
+            terminalreporter.write_line(row)
