@@ -1,4 +1,4 @@
-"""A whole session to parts of results: health, tracking, identification, bead, join."""
+"""A session to parts of results: health, tracking, identification, seam, bead, join."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from .axis_record import COMMAND, ENCODER
 from .health import health_part
 from .identification.assess import identify_or_refuse
 from .identification.part import refused_part
+from .seam_part import seam_part
 from .tracking import TrackingLimits, tracking_parts, unknown_tracking
 from .welds import chosen_welds
 
@@ -51,7 +52,8 @@ def assess_session(session: "Session", options: AnalyzeOptions) -> list[Assessed
         inputs = [input_of(path) for path in session.paths]
         reason = f"no control loop was recorded ({ENCODER}, {COMMAND}): {error}"
         log += [(unknown_tracking(reason, inputs), {}), (refused_part(reason, inputs), {})]
-    return [*((part, tables, {}) for part, tables in log), *_beads(session, options, welds)]
+    assessed: list[Assessed] = [(part, tables, {}) for part, tables in log]
+    return [*assessed, seam_part(session, welds), *_beads(session, options, welds)]
 
 
 def _beads(session: "Session", options: AnalyzeOptions, welds: "Sequence[Weld]") -> list[Assessed]:

@@ -6,7 +6,7 @@ key in the data block of the page, where `seamlog.reports.encode` puts them.
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, computed_field
 
 from seamlog.results import Criterion, Figure, Severity, Verdict
 
@@ -146,6 +146,16 @@ class Track(Block):
     right_y_px: Column
 
 
+class PictureMark(Block):
+    """A line across the bead that is drawn in the picture, from toe to toe and a little beyond."""
+
+    label: str
+    x1_px: float
+    y1_px: float
+    x2_px: float
+    y2_px: float
+
+
 class PictureBlock(Block):
     """A picture; with a track the shared cursor moves on it and it moves the cursor."""
 
@@ -159,6 +169,7 @@ class PictureBlock(Block):
     sha256: str
     image: bytes = Field(exclude=True, repr=False)
     track: Track | None = None
+    marks: list[PictureMark] = Field(default_factory=list)
 
 
 class Frame(Block):
@@ -182,6 +193,26 @@ class Frames(Block):
     frames: list[Frame]
 
 
+class Moment(Block):
+    """A place as photo and camera saw it; both follow the cursor.
+
+    `frame` is the camera picture of that moment, `frames` the block that holds all of them.
+    """
+
+    kind: Literal["moment"] = "moment"
+    id: str
+    caption: str
+    photo: PictureBlock | None = None
+    frame: Frame | None = None
+    frames: Frames | None = Field(None, exclude=True, repr=False)
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def frames_id(self) -> str | None:
+        """Where the other pictures of the camera are."""
+        return self.frames.id if self.frames else None
+
+
 AnyBlock = Annotated[
     Heading
     | Text
@@ -198,7 +229,8 @@ AnyBlock = Annotated[
     | SeamPlot
     | Histogram
     | PictureBlock
-    | Frames,
+    | Frames
+    | Moment,
     Field(discriminator="kind"),
 ]
 

@@ -1,5 +1,7 @@
 """What ties the axes of a run together: photo, seam and time, as far as the results know it."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from seamlog.results import Part
@@ -19,6 +21,23 @@ def links_of(run: Run) -> list[Link]:
         if {"s_mm", "stamp_ns"} <= set(table.columns)
     ]
     return [*links, *(link for part in run.of("join") for link in _to_seam(run, part))]
+
+
+def everywhere(links: Sequence[Link], domain: str, x: float) -> dict[str, float]:
+    """The place `x` of `domain` in every domain that links reach from there (as cursor.js)."""
+    at = {domain: x}
+    for _ in range(2):
+        for link in links:
+            ways = (
+                (link.source, link.target, link.source_x.values, link.target_x.values),
+                (link.target, link.source, link.target_x.values, link.source_x.values),
+            )
+            for source, target, source_x, target_x in ways:
+                if source not in at or target in at or source_x.size < 2:
+                    continue
+                if source_x[0] <= at[source] <= source_x[-1]:
+                    at[target] = float(np.interp(at[source], source_x, target_x))
+    return at
 
 
 def _to_time(run: Run, part: Part, table: str) -> Link:

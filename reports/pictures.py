@@ -6,7 +6,7 @@ import numpy as np
 
 from seamlog.results import Part, Picture
 
-from .content import AnyBlock, Frame, Frames, Notice, PictureBlock, Track
+from .content import AnyBlock, Frame, Frames, Notice, PictureBlock, PictureMark, Track
 from .curves import Column
 from .run import Run, anchor
 
@@ -19,18 +19,22 @@ MEDIA_TYPES = {
 _WIDEST_PX = 1600
 _MOST_BYTES = 400_000
 _QUALITY = 80
+_OVERHANG = 0.5
+"""How far a mark reaches beyond either toe, in widths of the bead."""
 _TOES = ("left_x_px", "left_y_px", "right_x_px", "right_y_px")
 
 
-def picture_block(run: Run, part: Part, name: str, track: Track | None = None) -> AnyBlock:
+def picture_block(
+    run: Run, part: Part, name: str, track: Track | None = None, widest_px: int = _WIDEST_PX
+) -> PictureBlock | Notice:
     """A picture of `part`; one in a format that browsers do not share becomes a notice."""
     picture = part.pictures[name]
     media_type = _media_type(picture)
     if not media_type:
         return _unknown(picture)
     image = run.results.picture(part, name)
-    if picture.width_px > _WIDEST_PX or len(image) > _MOST_BYTES:
-        image, media_type = _reduced(image, media_type)
+    if picture.width_px > widest_px or len(image) > _MOST_BYTES:
+        image, media_type = _reduced(image, media_type, widest_px)
     return PictureBlock(
         id=anchor("picture", str(run.index), part.stem, name),
         caption=picture.caption,
@@ -102,16 +106,31 @@ def toe_track(run: Run, part: Part, picture: Picture, table: str = "stations") -
     return Track(domain=domain, width_px=width_px, height_px=height_px, x=x, **toes)
 
 
-def _reduced(image: bytes, media_type: str) -> tuple[bytes, str]:
-    """The picture as WebP at most `_WIDEST_PX` wide; as it is where that does not work."""
+def mark_on(track: Track, x: float, label: str) -> PictureMark | None:
+    """A line across the bead at place `x` of the track; None where the toes are not known."""
+    places = track.x.values
+    ends = (track.left_x_px, track.left_y_px, track.right_x_px, track.right_y_px)
+    known = np.flatnonzero(np.isfinite(np.stack([places, *(end.values for end in ends)])).all(0))
+    if not known.size or not places[known[0]] <= x <= places[known[-1]]:
+        return None
+    at = known[int(np.argmin(np.abs(places[known] - x)))]
+    left_x, left_y, right_x, right_y = (float(end.values[at]) for end in ends)
+    dx, dy = _OVERHANG * (right_x - left_x), _OVERHANG * (right_y - left_y)
+    first = {"x1_px": round(left_x - dx, 1), "y1_px": round(left_y - dy, 1)}
+    last = {"x2_px": round(right_x + dx, 1), "y2_px": round(right_y + dy, 1)}
+    return PictureMark(label=label, **first, **last)
+
+
+def _reduced(image: bytes, media_type: str, widest_px: int = _WIDEST_PX) -> tuple[bytes, str]:
+    """The picture as WebP at most `widest_px` wide; as it is where that does not work."""
     import cv2
 
     decoded = cv2.imdecode(np.frombuffer(image, np.uint8), cv2.IMREAD_COLOR)
     if decoded is None:
         return image, media_type
     rows, columns = decoded.shape[:2]
-    if columns > _WIDEST_PX:
-        size = (_WIDEST_PX, max(round(rows * _WIDEST_PX / columns), 1))
+    if columns > widest_px:
+        size = (widest_px, max(round(rows * widest_px / columns), 1))
         decoded = cv2.resize(decoded, size, interpolation=cv2.INTER_AREA)
     done, coded = cv2.imencode(".webp", decoded, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
     return (coded.tobytes(), "image/webp") if done else (image, media_type)

@@ -49,7 +49,7 @@ class Report:
         """The whole report as typed content."""
         subject = ", ".join(dict.fromkeys(run.label for run in self._runs))
         return Document(
-            title=self._title or f"Weld report: {subject}",
+            title=self._title or f"Weld report: {self._named() or subject}",
             subject=subject,
             id=self._id(),
             date=self._date or self._end(),
@@ -65,6 +65,11 @@ class Report:
         document = self.document()
         write_bytes(path, render(document).encode(), force)
         return document
+
+    def _named(self) -> str:
+        """What the sessions call their parts; '' unless each of them does."""
+        names = [run.part_name for run in self._runs]
+        return ", ".join(dict.fromkeys(name for name in names if name)) if all(names) else ""
 
     def _id(self) -> str:
         digest = hashlib.sha256(b"".join(run.fingerprint for run in self._runs))

@@ -19,6 +19,7 @@ from .numbers import format_number
 KINDS = {
     "bead": "Bead",
     "join": "Join of bead and log",
+    "seam": "Seam and path",
     "tracking": "Tracking",
     "replay": "Replay",
     "identification": "Identification",
@@ -85,6 +86,15 @@ class Run:
             stated.append(figure.value if figure else None)
         known = [int(value) for value in stated if isinstance(value, int | float)]
         return max(known, default=None)
+
+    @property
+    def part_name(self) -> str:
+        """What the session says was welded; '' if it does not."""
+        for part in self.parts:
+            metadata = part.details.get("metadata")
+            if isinstance(metadata, dict) and isinstance(metadata.get("part"), str):
+                return str(metadata["part"])
+        return ""
 
     def place(self, part: Part, place: Place | None) -> PlaceLink | None:
         """Where a finding of `part` is, as something to jump to."""

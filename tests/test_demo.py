@@ -7,12 +7,14 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
+from playwright.sync_api import Page
 from rosbags.highlevel import AnyReader
 
 from seamlog import open_session
-from seamlog.results import Results
+from seamlog.results import Columns, Results
 from tests.browsing import Visitor
 
 
@@ -79,7 +81,7 @@ def test_replayed_outputs_stand_beside_the_originals(demo: Path, counts: dict[st
 
 def test_every_part_is_there(demo: Path) -> None:
     parts = {part.part for part in Results.open(demo / "weld.results").parts()}
-    assert {"health", "tracking", "identification", "replay", "bead", "join"} <= parts
+    assert {"health", "tracking", "seam", "identification", "replay", "bead", "join"} <= parts
 
 
 def test_the_report_opens_from_disk_without_a_request(demo: Path, visitor: Visitor) -> None:
@@ -90,3 +92,59 @@ def test_the_report_opens_from_disk_without_a_request(demo: Path, visitor: Visit
     assert visit.complaints == []
     text = visit.page.inner_text("body")
     assert "FAIL" in text and "weld speed" in text
+
+
+def test_hovering_the_wide_place_shows_its_frame_and_its_tracking_error(
+    demo: Path, visitor: Visitor
+) -> None:
+    """The product in one gesture: a place on the photo, its picture, its moment in the log."""
+    results = Results.open(demo / "weld.results")
+    parts = {part.part: part for part in results.parts()}
+    with open_session(demo / "weld.mcap") as session:
+        planted = json.loads(session.metadata["seamlog.truth"]["json"])["planted_cause"]
+    join = results.columns(parts["join"], "stations")
+    place = int(np.argmin(np.abs(join["s_mm"] - planted["s_mm"])))
+    moment_ns = int(join["stamp_ns"][place])
+    bead = results.columns(parts["bead"], "stations")
+    on_photo = join["s_mm"][place] + parts["join"].details["offset_mm"]
+    station = int(np.argmin(np.abs(bead["s_mm"] - on_photo)))
+
+    page = visitor.open(demo / "report.html").page
+    _hover_photo(page, parts["bead"].details, bead, station)
+    times = [p.time_ns for p in parts["seam"].pictures.values() if p.time_ns is not None]
+    nearest_ns = min(times, key=lambda time_ns: abs(time_ns - moment_ns))
+    error = results.columns(parts["tracking"], "error")
+    origin_ns = _origin_ns(results)
+    shown_s = float(page.locator("#moment-0 .seen").get_attribute("data-cursor") or "nan")
+    assert shown_s == pytest.approx((nearest_ns - origin_ns) / 1e9, abs=0.31)
+    plot = page.locator("#plot-0-tracking-error-error_mm")
+    at_s = float(plot.get_attribute("data-cursor") or "nan")
+    assert at_s == pytest.approx((moment_ns - origin_ns) / 1e9, abs=0.3)
+    row = int(np.argmin(np.abs((error["stamp_ns"] - origin_ns) / 1e9 - at_s)))
+    told = plot.locator(".now").first.inner_text().replace("−", "-")
+    assert float(told.split()[0]) == pytest.approx(float(error["error_mm"][row]), abs=0.01)
+
+
+def _hover_photo(page: Page, details: dict[str, Any], bead: Columns, station: int) -> None:
+    stage = page.locator("#picture-0-bead-overlay .stage")
+    stage.scroll_into_view_if_needed()
+    box = stage.locator(".marker").bounding_box()
+    assert box is not None
+    scale = min(
+        box["width"] / details["photo_width_px"], box["height"] / details["photo_height_px"]
+    )
+    left = box["x"] + (box["width"] - scale * details["photo_width_px"]) / 2
+    top = box["y"] + (box["height"] - scale * details["photo_height_px"]) / 2
+    x = (bead["left_x_px"][station] + bead["right_x_px"][station]) / 2
+    y = (bead["left_y_px"][station] + bead["right_y_px"][station]) / 2
+    page.mouse.move(left + scale * float(x), top + scale * float(y))
+
+
+def _origin_ns(results: Results) -> int:
+    """Zero of the report's time: the first stamp of any table but the join's."""
+    return min(
+        int(np.nanmin(results.columns(part, name)["stamp_ns"]))
+        for part in results.parts()
+        for name, table in part.tables.items()
+        if part.part != "join" and "stamp_ns" in table.columns
+    )

@@ -3,7 +3,7 @@
 const json = (id) => JSON.parse(document.getElementById(id).textContent);
 
 /* The bar under the page: a slider over the places of one domain, and what was there in words. */
-const MOST_WORDS = 4;
+const MOST_WORDS = 3;
 
 function wordsAt(bus, at, domain) {
   const words = [];
@@ -69,10 +69,13 @@ async function enliven() {
   for (const link of report.links) {
     bus.links.push({ ...link, source_x: await read(link.source_x), target_x: await read(link.target_x) });
   }
-  for (const block of report.sections.flatMap((section) => section.blocks)) {
+  const blocks = report.sections.flatMap((section) => section.blocks);
+  const cameras = new Map();
+  for (const block of blocks) {
     const figure = block.id === undefined ? null : document.getElementById(block.id);
-    if (block.kind === "picture" && block.track) bus.photos.push(await makePhoto(figure, block, read, bus));
-    if (block.kind === "frames") bus.photos.push(makeFrames(figure, block));
+    const photo = block.kind === "moment" ? block.photo : block.kind === "picture" ? block : null;
+    if (photo?.track) bus.photos.push(await makePhoto(document.getElementById(photo.id), photo, read, bus));
+    if (block.kind === "frames") cameras.set(block.id, makeFrames(figure, block));
     if (block.kind !== "time_plot" && block.kind !== "seam_plot") continue;
     const plot = await makePlot(figure, block, read, bus);
     if (plot === null) continue;
@@ -81,6 +84,10 @@ async function enliven() {
     watchExport(plot);
     figure.classList.add("is-live");
   }
+  for (const block of blocks.filter((one) => one.kind === "moment" && one.frame)) {
+    makeSeen(document.getElementById(block.id).querySelector(".seen"), cameras.get(block.frames_id));
+  }
+  bus.photos.push(...cameras.values());
   const photo = bus.photos.find((one) => one.isBead), plot = bus.plots[0];
   const tie = photo && bus.links.find((one) => one.source === photo.domain);
   const link = photo ? bus.links.find((one) => tie && one.source === tie.target) : bus.links[0];

@@ -1,8 +1,10 @@
-"""First screen: is this weld good, where not, and why."""
+"""First screen: is this weld good, where not, why, and what would have helped."""
 
 from collections.abc import Iterable, Sequence
 
-from seamlog.reports.content import AnyBlock, Findings, KeyFigures
+from seamlog.reports.advice import advice
+from seamlog.reports.content import AnyBlock, FindingLine, Findings, KeyFigures
+from seamlog.reports.moment import moment_of
 from seamlog.reports.run import Run
 from seamlog.reports.verdicts import overall
 from seamlog.results import Figure, Severity
@@ -21,10 +23,15 @@ _MOST_LINES = 6
 
 def section(runs: Sequence[Run]) -> list[AnyBlock]:
     """The verdict, the key figures and what went wrong where."""
-    blocks: list[AnyBlock] = [overall(runs)]
+    blocks: list[AnyBlock] = [overall(runs), *_what_went_wrong(runs), *_what_would_help(runs)]
+    blocks += [moment for run in runs if (moment := moment_of(run)) is not None]
     blocks += [KeyFigures(figures=found) for run in runs if (found := _key_figures(run))]
-    blocks += _what_went_wrong(runs)
     return blocks
+
+
+def _what_would_help(runs: Sequence[Run]) -> list[AnyBlock]:
+    lines = [FindingLine(severity=Severity.INFO, message=text) for text in advice(runs)]
+    return [Findings(caption="What would have helped", findings=lines)] if lines else []
 
 
 def _key_figures(run: Run) -> list[Figure]:

@@ -35,12 +35,13 @@ PHOTO = Input(name="weld.bead.jpg", sha256="b0" * 32, bytes=912_004)
 
 
 def write_sample(folder: Path, seed: int = 1) -> Results:
-    """A whole analysis: health, tracking, identification, replay, bead and join."""
+    """A whole analysis: health, tracking, seam, identification, replay, bead and join."""
     results = Results.create(folder)
     random = np.random.default_rng(seed)
     weld = _weld(random)
     _write_health(results)
     _write_tracking(results, weld)
+    _write_seam(results)
     _write_identification(results, random)
     _write_replay(results, weld, random)
     _write_bead(results, weld, random)
@@ -130,6 +131,20 @@ def _write_tracking(results: Results, weld: dict[str, Floats]) -> None:
             ],
         ),
         tables={"error": (error, units), "speed": (speed, {"weld_speed_mm_s": "mm/s"})},
+    )
+
+
+def _write_seam(results: Results) -> None:
+    stamp_ns = stamps(WELD_START_S + np.arange(0.0, 34.0, 0.1))
+    points = {"stamp_ns": stamp_ns, "seam_points": np.full(stamp_ns.size, 44)}
+    results.write(
+        Part(
+            part="seam",
+            title="Seam and path",
+            inputs=[SESSION],
+            figures=[_figure("pictures", "camera pictures", 340)],
+        ),
+        tables={"vision": (points, {})},
         pictures={f"frame{i}": _frame(i) for i in range(0, 34, 4)},
     )
 
@@ -343,7 +358,13 @@ def _write_join(results: Results, weld: dict[str, Floats]) -> None:
             ],
             details={
                 "offset_mm": OFFSET_MM,
-                "causes": [{"channel": "weld_speed", "s_mm": SLOW_S_MM}],
+                "causes": [
+                    {
+                        "channel": "weld_speed",
+                        "s_mm": SLOW_S_MM,
+                        "ranking": [{"channel": "weld_speed", "correlation": -0.96}],
+                    }
+                ],
             },
         ),
         tables={"stations": (columns, units)},

@@ -86,8 +86,13 @@ def test_the_camera_picture_of_the_moment_is_shown(visitor: Visitor, sample_page
     _hover(page, ERROR, 0.5)
     seconds = _cursor(page, ERROR)
     assert seconds is not None
-    assert _cursor(page, "#frames-0-tracking") == 30 + (seconds - 30) // 4 * 4
-    assert page.locator("#frames-0-tracking img:visible").count() == 1
+    shown = _cursor(page, "#frames-0-seam")
+    assert shown == 30 + 4 * round((seconds - 30) / 4)
+    assert page.locator("#frames-0-seam img:visible").count() == 1
+    assert _cursor(page, "#moment-0 .seen") == shown
+    same = "([a, b]) => document.querySelector(a).src === document.querySelector(b).src"
+    images = ["#frames-0-seam img:not([hidden])", "#moment-0 .seen img"]
+    assert page.evaluate(same, images)
 
 
 def test_hovering_the_photo_and_a_time_plot_moves_the_width(

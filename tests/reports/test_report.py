@@ -56,11 +56,11 @@ def test_the_date_is_the_end_of_the_weld_or_unknown(tmp_path: Path, sample: Resu
 def test_a_missing_part_is_named(tmp_path: Path) -> None:
     document = _report(_one_part(tmp_path / "r")).document()
     for section in document.sections:
-        if section.name in ("bead", "join", "replay", "identification", "health"):
+        if section.name in ("bead", "join", "seam", "replay", "identification", "health"):
             assert isinstance(section.blocks[0], Notice)
             assert "not recorded" in section.blocks[0].text
     text = (tmp_path / "x.html", page.render(document))[1]
-    assert text.count("(not recorded)") == 5
+    assert text.count("(not recorded)") == 6
 
 
 @pytest.mark.parametrize(
