@@ -14,6 +14,7 @@ GROUPS = (
     "seamlog.seam_detectors",
     "seamlog.bead_detectors",
     "seamlog.sources",
+    "seamlog.decoders",
     "seamlog.importers",
     "seamlog.sections",
 )

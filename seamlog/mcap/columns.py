@@ -1,6 +1,8 @@
 """Columns of one channel: field name to numpy array, built batch by batch."""
 
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,14 +10,16 @@ from numpy.typing import NDArray
 
 from seamlog.errors import LimitExceeded
 from seamlog.limits import Limits
-from seamlog.mcap.cdr import Shape, learn, numpy_form
-from seamlog.mcap.ros2msg import SEQUENCE, Node
 from seamlog.mcap.rows import PAYLOAD, Batch, Rows
+from seamlog.mcap.shapes import Forms, Grammar, Shape
 
 Columns = dict[str, NDArray[Any]]
 LOG_TIME = "log_time_ns"
 STAMP = "stamp_ns"
-_MAX_SHAPES = 4096
+_ELEMENT = re.compile(r"(?P<head>[^\[\]]+)\[(?P<place>\d{1,9})\](?P<tail>(\.[^\[\]]+)?)")
+_MANY_SHAPES, _MOST_SHAPES = 64, 4096
+_ROWS_PER_SHAPE = 32
+"""Learning a shape costs about as much as decoding this many messages of any shape."""
 
 
 class GrowingColumn:
@@ -40,68 +44,130 @@ class GrowingColumn:
         return self._data[: self._size]
 
 
-def column_forms(nodes: tuple[Node, ...], prefix: str = "") -> dict[str, tuple[Any, int | None]]:
-    """Column name to (dtype, length of a fixed array or None) of a message definition."""
-    forms: dict[str, tuple[Any, int | None]] = {}
-    for node in nodes:
-        name = prefix + node.name
-        if node.fields is not None and node.count is None:
-            forms |= column_forms(node.fields, name + ".")
-        elif node.fields is not None or node.base == "string" or node.count == SEQUENCE:
-            forms[name] = (object, None)
-        else:
-            forms[name] = (numpy_form(node.base), node.count)
-    return forms
+def check_size(length: int, limits: Limits) -> None:
+    """Raise `LimitExceeded` if records of `length` bytes hold too large a message."""
+    if length - PAYLOAD > limits.message_bytes:
+        raise LimitExceeded(
+            f"a message of {length - PAYLOAD} bytes is larger than the limit "
+            f"message_bytes = {limits.message_bytes}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """A column that is asked for: a field, or one element of a field that holds sequences."""
+
+    name: str
+    field: str
+    place: int | None = None
+
+
+def wish(name: str, forms: Forms) -> Wish | None:
+    """What `name` (`position` or `position[0]`, `joints[0].x`) asks for; None if unknown."""
+    if name in forms:
+        return Wish(name, name)
+    match = _ELEMENT.fullmatch(name)
+    if match is None:
+        return None
+    field = match["head"] + match["tail"]
+    if field not in forms or forms[field].element is None:
+        return None
+    return Wish(name, field, int(match["place"]))
+
+
+def _form(wished: Wish, forms: Forms) -> tuple[Any, int | None]:
+    """Numbers out of sequences are float64, so that NaN can stand where one is too short."""
+    form = forms[wished.field]
+    if wished.place is None:
+        return form.dtype, form.count
+    return (object if form.element is object else np.float64), None
 
 
 class ChannelDecoder:
-    """Decodes the CDR messages of one channel into the columns `names`."""
+    """Decodes the messages of one channel into the columns that are wished for."""
 
     def __init__(
-        self, nodes: tuple[Node, ...], names: Iterable[str], limits: Limits, hint: int = 0
+        self, grammar: Grammar, wishes: Sequence[Wish], limits: Limits, hint: int = 0
     ) -> None:
-        forms = column_forms(nodes)
-        self._nodes, self._limits = nodes, limits
+        self._grammar, self._limits, self._wishes = grammar, limits, wishes
         self._shapes: dict[int, list[Shape]] = {}
-        self._columns = {name: GrowingColumn(*forms[name], hint) for name in names}
+        self._learned = self._seen = 0
+        self._columns = {
+            wished.name: GrowingColumn(*_form(wished, grammar.forms), hint) for wished in wishes
+        }
         self._log_times = GrowingColumn(np.int64, None, hint)
 
     def add(self, batch: Batch) -> None:
         """Decode a batch; `Malformed` if a message does not fit the definition."""
         rooms = {name: column.room(batch.count) for name, column in self._columns.items()}
         rooms[LOG_TIME] = self._log_times.room(batch.count)
-        for rows, places in batch.groups:
-            if rows.length - PAYLOAD > self._limits.message_bytes:
-                raise LimitExceeded(
-                    f"a message of {rows.length - PAYLOAD} bytes is larger than the limit "
-                    f"message_bytes = {self._limits.message_bytes}"
-                )
-            self._add_rows(rows, places, rooms)
+        for rows, places in batch.groups():
+            check_size(rows.length, self._limits)
+            if not self._add_rows(rows, places, rooms):
+                self._decode_all(batch, rooms)
+                return
+
+    @property
+    def _is_varied(self) -> bool:
+        few = self._learned * _ROWS_PER_SHAPE > self._seen
+        return self._learned > _MANY_SHAPES and (few or self._learned > _MOST_SHAPES)
 
     def _add_rows(
         self, rows: Rows, places: NDArray[np.int64] | None, rooms: Mapping[str, NDArray[Any]]
-    ) -> None:
+    ) -> bool:
+        """Store rows by their shapes; False once there are too many shapes for that."""
         known = self._shapes.setdefault(rows.length, [])
         untried = iter(list(known))
         while rows.count:
             shape = next(untried, None)
             if shape is None:
-                shape = learn(self._nodes, rows)
-                self._remember(known, shape)
+                if self._is_varied:
+                    return False
+                shape = self._grammar.learn(rows)
+                known.append(shape)
+                self._learned += 1
             same = shape.matches(rows)
             if same.all():
-                _store(shape, rows, places, rooms)
-                return
+                self._store(shape, rows, places, rooms)
+                return True
             if not same.any():
                 continue
             at = np.arange(rows.count) if places is None else places
-            _store(shape, rows.select(same), at[same], rooms)
+            self._store(shape, rows.select(same), at[same], rooms)
             rows, places = rows.select(~same), at[~same]
+        return True
 
-    def _remember(self, known: list[Shape], shape: Shape) -> None:
-        if sum(map(len, self._shapes.values())) >= _MAX_SHAPES:
-            self._shapes.clear()
-        known.append(shape)
+    def _store(
+        self,
+        shape: Shape,
+        rows: Rows,
+        places: NDArray[np.int64] | None,
+        rooms: Mapping[str, NDArray[Any]],
+    ) -> None:
+        where: Any = slice(None) if places is None else places
+        self._seen += rows.count
+        rooms[LOG_TIME][where] = rows.log_times_ns()
+        leaves = {leaf.name: leaf for leaf in shape.leaves}
+        for wished in self._wishes:
+            leaf, room = leaves[wished.field], rooms[wished.name]
+            if wished.place is None:
+                room[where] = leaf.read(rows)
+            elif leaf.element is not None and wished.place < leaf.count:
+                room[where] = leaf.element(wished.place)(rows)
+            else:
+                room[where] = _missing(room)
+
+    def _decode_all(self, batch: Batch, rooms: Mapping[str, NDArray[Any]]) -> None:
+        self._shapes.clear()
+        rooms[LOG_TIME][:] = batch.log_times_ns()
+        found = self._grammar.decode(batch, [wished.field for wished in self._wishes])
+        for wished in self._wishes:
+            column, room, place = found[wished.field], rooms[wished.name], wished.place
+            if place is None:
+                room[:] = column
+                continue
+            lacking = _missing(room)
+            room[:] = [values[place] if place < len(values) else lacking for values in column]
 
     def columns(self) -> Columns:
         """What was decoded, `log_time_ns` first, in file order."""
@@ -109,17 +175,8 @@ class ChannelDecoder:
         return arrays | {name: column.array() for name, column in self._columns.items()}
 
 
-def _store(
-    shape: Shape,
-    rows: Rows,
-    places: NDArray[np.int64] | None,
-    rooms: Mapping[str, NDArray[Any]],
-) -> None:
-    where: Any = slice(None) if places is None else places
-    rooms[LOG_TIME][where] = rows.log_times_ns()
-    for leaf in shape.leaves:
-        if leaf.name in rooms:
-            rooms[leaf.name][where] = leaf.read(rows)
+def _missing(room: NDArray[Any]) -> Any:
+    return None if room.dtype == object else np.nan
 
 
 def by_log_time(columns: Columns) -> Columns:

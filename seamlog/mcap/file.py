@@ -1,7 +1,9 @@
 """One MCAP file as a whole: its table of contents, its chunks, columns of its channels."""
 
+import gc
 import logging
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -12,19 +14,22 @@ from seamlog.errors import SessionError, UnknownName
 from seamlog.limits import LIMITS, Limits
 from seamlog.mcap import parsing, records
 from seamlog.mcap.chunks import read_chunk
-from seamlog.mcap.columns import LOG_TIME, STAMP, ChannelDecoder, Columns, column_forms
+from seamlog.mcap.columns import LOG_TIME, STAMP, ChannelDecoder, Columns, Wish, wish
+from seamlog.mcap.decoders import Decoder, decoder_of
 from seamlog.mcap.index import FileIndex, load_index
-from seamlog.mcap.json_columns import json_columns
 from seamlog.mcap.message_index import all_offsets, plausible_places
+from seamlog.mcap.one_by_one import columns_one_by_one
 from seamlog.mcap.records import ChannelRecord, ChunkEntry, Malformed
-from seamlog.mcap.ros2msg import DefinitionError, Node, parse
 from seamlog.mcap.rows import Chunk, iter_batches, walk_messages
+from seamlog.mcap.shapes import Forms, Grammar
 from seamlog.mcap.source import FileSource
 
 _LOG = logging.getLogger("seamlog")
 ENDLESS = (0, 1 << 64)
 """The window that holds every log time."""
-_STAMPS = ("header.stamp", "stamp")
+_STAMPS = ("header.stamp", "stamp", "timestamp")
+_PARTS = (("sec", "nanosec"), ("seconds", "nanos"), ("secs", "nsecs"), ("sec", "nsec"))
+"""Names of seconds and nanoseconds: ROS 2, protobuf, ROS 1, and Foxglove's JSON."""
 
 
 class McapFile:
@@ -84,22 +89,10 @@ class McapFile:
             self.problems.append(problem)
             _LOG.warning("%s", problem)
 
-    def definition(self, channel: ChannelRecord) -> tuple[Node, ...]:
-        """Fields of the messages of a CDR channel; `SessionError` if they cannot be decoded."""
+    def decoder(self, channel: ChannelRecord) -> Decoder:
+        """What decodes the messages of a channel; `SessionError` if nothing does."""
         schema = self.index.schemas.get(channel.schema_id)
-        where = f"{self.path}: {channel.topic}"
-        if schema is None or schema.encoding != "ros2msg":
-            found = schema.encoding if schema else "no"
-            raise SessionError(
-                f"{where} has a message definition in {found} form; only ros2msg and JSON are "
-                "decoded so far: convert the file, for example with a ros2 bag tool"
-            )
-        try:
-            return parse(schema.name, schema.data.decode())
-        except (DefinitionError, UnicodeDecodeError) as error:
-            raise SessionError(
-                f"{where}: the definition of {schema.name} cannot be read: {error}"
-            ) from error
+        return decoder_of(channel, schema, f"{self.path}: {channel.topic}")
 
     def columns(
         self,
@@ -109,18 +102,10 @@ class McapFile:
     ) -> Columns:
         """Columns of one channel in file order, `log_time_ns` first."""
         entries = self.entries(channel.id, window)
-        batches = iter_batches(self.iter_chunks(entries), channel.id)
+        decoder = self.decoder(channel)
         try:
-            if channel.message_encoding == "json":
-                columns = _picked(json_columns(batches), fields, channel.topic)
-            else:
-                nodes = self._cdr_definition(channel)
-                names = _wanted(nodes, fields, channel.topic)
-                hint = self._hint(channel.id, entries)
-                decoder = ChannelDecoder(nodes, names, self.limits, hint)
-                for batch in batches:
-                    decoder.add(batch)
-                columns = decoder.columns()
+            with _without_collection():
+                columns = self._decoded(channel, entries, decoder, fields)
         except Malformed as error:
             raise SessionError(
                 f"{self.path}: {channel.topic}: a message does not fit its definition: {error}"
@@ -128,13 +113,23 @@ class McapFile:
         self._check_count(channel, len(columns[LOG_TIME]), window)
         return _within(_with_stamp(columns, fields), window)
 
-    def _cdr_definition(self, channel: ChannelRecord) -> tuple[Node, ...]:
-        if channel.message_encoding != "cdr":
-            raise SessionError(
-                f"{self.path}: {channel.topic} is encoded as {channel.message_encoding!r}; cdr "
-                "and json are decoded so far: convert the file to one of them"
-            )
-        return self.definition(channel)
+    def _decoded(
+        self,
+        channel: ChannelRecord,
+        entries: list[ChunkEntry],
+        decoder: Decoder,
+        fields: Sequence[str] | None,
+    ) -> Columns:
+        batches = iter_batches(self.iter_chunks(entries), channel.id)
+        if not isinstance(decoder, Grammar):
+            found = columns_one_by_one(batches, decoder, self.limits)
+            return _picked(found, fields, channel.topic)
+        wishes = _wishes(decoder.forms, fields, channel.topic)
+        hint = self._hint(channel.id, entries)
+        channel_decoder = ChannelDecoder(decoder, wishes, self.limits, hint)
+        for batch in batches:
+            channel_decoder.add(batch)
+        return channel_decoder.columns()
 
     def _hint(self, channel_id: int, entries: list[ChunkEntry]) -> int:
         room = sum(min(e.uncompressed_size, self.limits.chunk_bytes) for e in entries) // 31
@@ -187,24 +182,37 @@ class McapFile:
         self.source.close()
 
 
-def _wanted(nodes: tuple[Node, ...], fields: Sequence[str] | None, topic: str) -> list[str]:
-    known = list(column_forms(nodes))
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Millions of fresh objects make the garbage collector look at all of them, for nothing."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def _wishes(forms: Forms, fields: Sequence[str] | None, topic: str) -> list[Wish]:
     if fields is None:
-        return known
-    asked = [name for name in fields if name not in (LOG_TIME, STAMP)]
-    _check_names(asked, known, topic)
-    stamps = [STAMP] + [f"{stamp}.{part}" for stamp in _STAMPS for part in ("sec", "nanosec")]
-    return [name for name in known if name in asked or name in stamps]
+        return [Wish(name, name) for name in forms]
+    asked = dict.fromkeys(name for name in fields if name not in (LOG_TIME, STAMP))
+    found = {name: wish(name, forms) for name in asked}
+    _raise_unknown([name for name, wished in found.items() if wished is None], forms, topic)
+    stamps = [STAMP, *(f"{stamp}.{part}" for stamp in _STAMPS for pair in _PARTS for part in pair)]
+    found |= {name: Wish(name, name) for name in stamps if name in forms}
+    return [wished for wished in found.values() if wished is not None]
 
 
 def _picked(columns: Columns, fields: Sequence[str] | None, topic: str) -> Columns:
     if fields is not None:
-        _check_names([n for n in fields if n not in (LOG_TIME, STAMP)], list(columns), topic)
+        asked = [name for name in fields if name not in (LOG_TIME, STAMP)]
+        _raise_unknown([name for name in asked if name not in columns], columns, topic)
     return columns
 
 
-def _check_names(asked: list[str], known: list[str], topic: str) -> None:
-    unknown = [name for name in asked if name not in known]
+def _raise_unknown(unknown: list[str], known: Iterable[str], topic: str) -> None:
     if unknown:
         raise UnknownName(
             f"{topic} has no field {', '.join(unknown)}; it has: {', '.join(sorted(known))}"
@@ -212,12 +220,12 @@ def _check_names(asked: list[str], known: list[str], topic: str) -> None:
 
 
 def _with_stamp(columns: Columns, fields: Sequence[str] | None) -> Columns:
-    if STAMP not in columns:
-        for stamp in _STAMPS:
-            seconds, rest = columns.get(f"{stamp}.sec"), columns.get(f"{stamp}.nanosec")
-            if seconds is not None and rest is not None:
-                columns[STAMP] = seconds.astype(np.int64) * 1_000_000_000 + rest
-                break
+    pairs = ((f"{stamp}.{one}", f"{stamp}.{two}") for stamp in _STAMPS for one, two in _PARTS)
+    found = next((pair for pair in pairs if set(pair) <= columns.keys()), None)
+    if STAMP not in columns and found:
+        seconds, rest = (columns[name] for name in found)
+        if seconds.dtype.kind in "iu" and rest.dtype.kind in "iu":
+            columns[STAMP] = seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
     if fields is None:
         return columns
     kept = (LOG_TIME, STAMP, *fields)

@@ -13,7 +13,13 @@ _LINE = re.compile(
 )
 _CONSTANT = re.compile(r"\s*=")
 _TIME = "int32 sec\nuint32 nanosec\n"
-_KNOWN = {"builtin_interfaces/Time": _TIME, "builtin_interfaces/Duration": _TIME}
+_KNOWN = {
+    "builtin_interfaces/Time": _TIME,
+    "builtin_interfaces/Duration": _TIME,
+    # the two primitive times of ROS 1
+    "time": "uint32 secs\nuint32 nsecs\n",
+    "duration": "int32 secs\nint32 nsecs\n",
+}
 _EMPTY = "uint8 structure_needs_at_least_one_member\n"
 
 

@@ -65,13 +65,65 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """Messages of one channel in file order, grouped by length.
+    """Messages of one channel in file order.
 
-    `groups` holds the rows of each length and their positions in the batch (None: all of it).
+    `uniform` holds them all where they follow each other and have one length; else there are the
+    `offsets` and whole `lengths` of their records in `data`.
     """
 
-    count: int
-    groups: tuple[tuple[Rows, NDArray[np.int64] | None], ...]
+    data: NDArray[np.uint8]
+    uniform: Rows | None
+    offsets: NDArray[np.int64]
+    lengths: NDArray[np.int64]
+
+    @property
+    def count(self) -> int:
+        """How many messages there are."""
+        return self.uniform.count if self.uniform else len(self.offsets)
+
+    def groups(self) -> Iterator[tuple[Rows, NDArray[np.int64] | None]]:
+        """Rows of each length and their positions in the batch (None: all of it)."""
+        if self.uniform:
+            yield self.uniform, None
+            return
+        for length in np.unique(self.lengths).tolist():
+            places = np.flatnonzero(self.lengths == length)
+            rows = _gather(self.data, self.offsets[places], length)
+            yield rows, None if len(places) == len(self.offsets) else places
+
+    def places(self) -> Places:
+        """Offsets and whole lengths of all messages."""
+        if self.uniform is None:
+            return self.offsets, self.lengths
+        rows = self.uniform
+        steps = np.arange(rows.count, dtype=np.int64) * rows.stride
+        return rows.start + steps, np.full(rows.count, rows.length, np.int64)
+
+    def payloads(self) -> Iterator[tuple[int, memoryview]]:
+        """Log time and payload of each message."""
+        data = self.data.data
+        for at, length in zip(*(part.tolist() for part in self.places()), strict=True):
+            time = int.from_bytes(data[at + 15 : at + 23], "little", signed=True)
+            yield time, data[at + PAYLOAD : at + length]
+
+    def sequences(self) -> NDArray[np.uint32]:
+        """Sequence number of each message."""
+        return self._heads(11, "<u4")
+
+    def log_times_ns(self) -> NDArray[np.int64]:
+        """Log time of each message."""
+        return self._heads(15, "<i8")
+
+    def _heads(self, at: int, form: str) -> NDArray[Any]:
+        if self.uniform:
+            return self.uniform.column(at - PAYLOAD, form)
+        kind = np.dtype(form)
+        windows = np.lib.stride_tricks.sliding_window_view(self.data, kind.itemsize)
+        values: NDArray[Any] = windows[self.offsets + at].view(kind).ravel()
+        return values
+
+
+_NO_PLACES: Places = (np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def iter_batches(chunks: Iterable[Chunk], channel_id: int) -> Iterator[Batch]:
@@ -115,9 +167,9 @@ def _batch(data: memoryview, channel_id: int, chunk: Chunk | None) -> Batch:
     array = np.frombuffer(data, np.uint8)
     rows = _uniform(data, array, channel_id)
     if rows is not None:
-        return Batch(rows.count, ((rows, None),))
+        return Batch(array, rows, *_NO_PLACES)
     places = _indexed(array, chunk, channel_id) if chunk else None
-    return _grouped(array, *(places or walk_messages(data, channel_id)))
+    return Batch(array, None, *(places or walk_messages(data, channel_id)))
 
 
 def _uniform(data: memoryview, array: NDArray[np.uint8], channel_id: int) -> Rows | None:
@@ -189,17 +241,6 @@ def walk_messages(data: memoryview, channel_id: int) -> Places:
     if at != end:
         raise Malformed("its records do not fill it")
     return np.array(offsets, np.int64), np.array(lengths, np.int64)
-
-
-def _grouped(
-    array: NDArray[np.uint8], offsets: NDArray[np.int64], lengths: NDArray[np.int64]
-) -> Batch:
-    groups = []
-    for length in np.unique(lengths).tolist():
-        places = np.flatnonzero(lengths == length)
-        rows = _gather(array, offsets[places], length)
-        groups.append((rows, None if len(places) == len(offsets) else places))
-    return Batch(len(offsets), tuple(groups))
 
 
 def _gather(array: NDArray[np.uint8], offsets: NDArray[np.int64], length: int) -> Rows:

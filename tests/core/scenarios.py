@@ -205,10 +205,8 @@ def write_foreign(path: Path, options: Mapping[str, Any], count: int = 60) -> Ex
             "header.frame_id": ["base"] * count,
             "name": [["a", "bb", "ccc", "x"][:size] for size in sizes],
             "position": [np.full(size, place + 0.5) for place, size in enumerate(sizes)],
-            "tips": [
-                [{"x": place + 0.5, "y": 2 * place + 1.0}] * size
-                for place, size in enumerate(sizes)
-            ],
+            "tips.x": [np.full(size, place + 0.5) for place, size in enumerate(sizes)],
+            "tips.y": [np.full(size, 2 * place + 1.0) for place, size in enumerate(sizes)],
             "base.y": [-1.5] * count,
             "ok": [True] * count,
         },

@@ -14,10 +14,7 @@ BAGS = ("cdr_test", "talker", "wbag")
 
 
 def same(found: Any, wanted: Any) -> None:
-    if isinstance(found, dict):
-        for name, value in found.items():
-            same(value, attribute(wanted, name))
-    elif isinstance(found, list):
+    if isinstance(found, list):
         assert len(found) == len(wanted)
         for one, other in zip(found, wanted, strict=True):
             same(one, other)
@@ -30,7 +27,10 @@ def same(found: Any, wanted: Any) -> None:
 
 def attribute(message: Any, name: str) -> Any:
     for part in name.split("."):
-        message = getattr(message, part)
+        if isinstance(message, list):
+            message = [getattr(item, part) for item in message]
+        else:
+            message = getattr(message, part)
     return message
 
 
