@@ -1,6 +1,7 @@
 """Curves and what they are drawn with: columns, series, plots, histograms, ties of axes."""
 
 import hashlib
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, computed_field
 
 from .block import Block
+from .encode import Encoded, encode
 from .numbers import curve_decimals
 
 
@@ -17,11 +19,16 @@ class Column(Block):
     values: NDArray[Any] = Field(exclude=True, repr=False)
 
     @computed_field  # type: ignore[prop-decorator]
-    @property
+    @cached_property
     def key(self) -> str:
         """Name in the data block: a hash of the values, so that equal columns are stored once."""
         plain = np.ascontiguousarray(self.values, dtype=np.float64)
         return "c" + hashlib.sha256(plain.tobytes()).hexdigest()[:16]
+
+    @cached_property
+    def coded(self) -> Encoded:
+        """The values as they stand in the data block."""
+        return encode(self.values)
 
 
 class Series(Block):
@@ -82,6 +89,8 @@ class Plot(Block):
     marks: list[Mark] = Field(default_factory=list)
     compact: bool = False
     """Drawn low, as one of several strips over the same x."""
+    live: bool = True
+    """False: its points are not in the file, only its drawing."""
 
 
 class TimePlot(Plot):

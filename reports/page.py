@@ -16,11 +16,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from pydantic import BaseModel
 
-from seamlog.results import Verdict
-
-from .content import Frame, PictureBlock, Section
-from .curves import Column, Histogram, Link, Plot
-from .encode import encode
+from .content import Frame, PictureBlock
+from .curves import Column, Histogram, Plot
+from .document import Document
 from .figures import draw_histogram, draw_plot
 from .numbers import figure_quantity, format_quantity
 from .verdicts import grouped, limits_text
@@ -41,20 +39,6 @@ SCRIPTS = (
 UPLOT = ("uPlot.iife.min.js", "uPlot.min.css", "LICENSE")
 
 
-class Document(BaseModel):
-    """Everything the page shows; its dump is the JSON twin."""
-
-    title: str
-    subject: str
-    id: str
-    date: str | None
-    verdict: Verdict
-    seamlog_version: str
-    interactive: bool
-    sections: list[Section]
-    links: list[Link]
-
-
 def render(document: Document) -> str:
     """The page; the same document gives the same text."""
     script = _script() if document.interactive else ""
@@ -68,16 +52,10 @@ def render(document: Document) -> str:
             style=Markup(plain),
             script=Markup(script),
             notice=_asset("uplot", "LICENSE") if document.interactive else "",
-            twin=embedded(twin(document)),
+            twin=embedded(document.twin()),
             data=embedded(_data(document)) if document.interactive else "",
         )
     )
-
-
-def twin(document: Document) -> dict[str, Any]:
-    """The report for programs: the same objects the page was made of, without the arrays."""
-    head = {"schema": "seamlog.report", "version": 1}
-    return head | document.model_dump(mode="json")
 
 
 def embedded(value: Any) -> Markup:
@@ -94,20 +72,21 @@ def has_uplot() -> bool:
 
 
 def _data(document: Document) -> dict[str, Any]:
-    columns = {column.key: column for column in _columns([document])}
-    return {
-        key: encode(column.values).model_dump(exclude_none=True) for key, column in columns.items()
-    }
+    columns = {column.key: column for column in columns_of([document])}
+    return {key: column.coded.model_dump(exclude_none=True) for key, column in columns.items()}
 
 
-def _columns(found: Iterable[Any]) -> Iterator[Column]:
+def columns_of(found: Iterable[Any]) -> Iterator[Column]:
+    """The columns whose points the page needs, in its order; one may come several times."""
     for value in found:
         if isinstance(value, Column):
             yield value
+        elif isinstance(value, Plot) and not value.live:
+            continue
         elif isinstance(value, BaseModel):
-            yield from _columns(getattr(value, name) for name in type(value).model_fields)
+            yield from columns_of(getattr(value, name) for name in type(value).model_fields)
         elif isinstance(value, list):
-            yield from _columns(value)
+            yield from columns_of(value)
 
 
 def _policy(script: str, style: str) -> str:

@@ -1,9 +1,13 @@
 """Pictures of the results: no larger than a page can show, tied to the places of the bead."""
 
+import hashlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from seamlog.errors import UsageError
 from seamlog.results import Part, Picture
 
 from .content import AnyBlock, Frame, Frames, Notice, PictureBlock, PictureMark, Track
@@ -19,6 +23,7 @@ MEDIA_TYPES = {
 _WIDEST_PX = 1600
 _MOST_BYTES = 400_000
 _QUALITY = 80
+_FRAME_WIDEST_PX, _FRAME_QUALITY = 320, 50
 _OVERHANG = 0.5
 """How far a mark reaches beyond either toe, in widths of the bead."""
 _TOES = ("left_x_px", "left_y_px", "right_x_px", "right_y_px")
@@ -48,6 +53,28 @@ def picture_block(
     )
 
 
+def picture_of_pixels(name: str, image: NDArray[Any], caption: str) -> PictureBlock:
+    """A caller's own picture, uint8, grey or BGR, as PNG."""
+    import cv2
+
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or not image.size:
+        raise UsageError(f"{caption}: a picture is uint8 of 2 (grey) or 3 (BGR) dimensions")
+    data = cv2.imencode(".png", image)[1].tobytes()
+    media_type = "image/png"
+    if image.shape[1] > _WIDEST_PX or len(data) > _MOST_BYTES:
+        data, media_type = _reduced(data, media_type)
+    return PictureBlock(
+        id=anchor("picture", name),
+        caption=caption,
+        alt=caption,
+        media_type=media_type,
+        width_px=image.shape[1],
+        height_px=image.shape[0],
+        sha256=hashlib.sha256(data).hexdigest(),
+        image=data,
+    )
+
+
 def frame_blocks(run: Run, part: Part) -> list[AnyBlock]:
     """The pictures of `part` that have a time, as one block that follows the cursor."""
     timed = {name: p for name, p in part.pictures.items() if p.time_ns is not None}
@@ -55,15 +82,7 @@ def frame_blocks(run: Run, part: Part) -> list[AnyBlock]:
     blocks: list[AnyBlock] = [_unknown(p) for name, p in timed.items() if name not in known]
     if not known:
         return blocks
-    frames = [
-        Frame(
-            seconds=run.second(picture.time_ns or 0),
-            media_type=_media_type(picture),
-            sha256=picture.sha256,
-            image=run.results.picture(part, name),
-        )
-        for name, picture in known.items()
-    ]
+    frames = [_frame(run, part, name, picture) for name, picture in known.items()]
     first = next(iter(known.values()))
     block = Frames(
         id=anchor("frames", str(run.index), part.stem),
@@ -74,6 +93,18 @@ def frame_blocks(run: Run, part: Part) -> list[AnyBlock]:
         frames=sorted(frames, key=lambda frame: frame.seconds),
     )
     return [*blocks, block]
+
+
+def _frame(run: Run, part: Part, name: str, picture: Picture) -> Frame:
+    image, media_type = run.results.picture(part, name), _media_type(picture)
+    if picture.width_px > _FRAME_WIDEST_PX:
+        image, media_type = _reduced(image, media_type, _FRAME_WIDEST_PX, _FRAME_QUALITY)
+    return Frame(
+        seconds=run.second(picture.time_ns or 0),
+        media_type=media_type,
+        sha256=picture.sha256,
+        image=image,
+    )
 
 
 def _media_type(picture: Picture) -> str:
@@ -121,7 +152,9 @@ def mark_on(track: Track, x: float, label: str) -> PictureMark | None:
     return PictureMark(label=label, **first, **last)
 
 
-def _reduced(image: bytes, media_type: str, widest_px: int = _WIDEST_PX) -> tuple[bytes, str]:
+def _reduced(
+    image: bytes, media_type: str, widest_px: int = _WIDEST_PX, quality: int = _QUALITY
+) -> tuple[bytes, str]:
     """The picture as WebP at most `widest_px` wide; as it is where that does not work."""
     import cv2
 
@@ -132,5 +165,5 @@ def _reduced(image: bytes, media_type: str, widest_px: int = _WIDEST_PX) -> tupl
     if columns > widest_px:
         size = (widest_px, max(round(rows * widest_px / columns), 1))
         decoded = cv2.resize(decoded, size, interpolation=cv2.INTER_AREA)
-    done, coded = cv2.imencode(".webp", decoded, [cv2.IMWRITE_WEBP_QUALITY, _QUALITY])
+    done, coded = cv2.imencode(".webp", decoded, [cv2.IMWRITE_WEBP_QUALITY, quality])
     return (coded.tobytes(), "image/webp") if done else (image, media_type)

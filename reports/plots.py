@@ -5,12 +5,13 @@ the difference of. `u_<name>` is the standard uncertainty of `<name>` and become
 (k = 2); `band_low_<name>` and `band_high_<name>` are the band of the column whose name ends alike.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from seamlog.errors import UsageError
 from seamlog.results import Part
 
 from .curves import Column, Limit, Mark, SeamPlot, Series, TimePlot
@@ -164,3 +165,36 @@ def _marks(part: Part, axis: str) -> list[Mark]:
         for finding in part.findings
         if finding.place is not None and finding.place.s_mm is not None
     ]
+
+
+def make_curves(
+    name: str,
+    title: str,
+    x: ArrayLike,
+    curves: Mapping[str, ArrayLike],
+    unit: str,
+    x_label: str,
+    x_unit: str,
+    limits: Mapping[str, float],
+) -> TimePlot:
+    """A plot of a caller's own arrays, all of the length of `x`; `UsageError` if they are not."""
+    places = np.asarray(x, dtype=np.float64)
+    columns = {label: np.asarray(values, dtype=np.float64) for label, values in curves.items()}
+    if places.ndim != 1 or any(values.shape != places.shape for values in columns.values()):
+        raise UsageError(f"{title}: x and all curves must be of one dimension and one length")
+    if not np.isfinite(places).all() or np.any(np.diff(places) < 0):
+        raise UsageError(f"{title}: x must ascend and have no gap")
+    return TimePlot(
+        id=anchor("plot", name),
+        title=title,
+        domain=f"own/{name}",
+        x=Column(values=places),
+        x_label=x_label,
+        x_unit=x_unit,
+        y_label=_axis_label("", unit),
+        series=[
+            Series(label=label, unit=unit, values=Column(values=values))
+            for label, values in columns.items()
+        ],
+        limits=[Limit(label=label, value=value) for label, value in limits.items()],
+    )

@@ -3,9 +3,12 @@
 Analysis writes it, reports read it and nothing else. Every part has the same shape (`Part`):
 figures with uncertainty, criteria with a verdict, findings with a place, tables, pictures. What
 could not be measured is there too, as a figure without value and with the reason.
+`python -m seamlog.results` prints the JSON Schema of a part.
 """
 
 import hashlib
+import json
+import sys
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
@@ -275,3 +278,13 @@ class Results:
                 f"{self.folder}: {name!r} is no plain file name; refuse to follow it"
             )
         return self.folder / name
+
+
+def part_schema() -> dict[str, Any]:
+    """JSON Schema of `<part>.json`."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return head | Part.model_json_schema()
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(part_schema(), indent=1) + "\n")

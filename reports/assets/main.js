@@ -76,7 +76,7 @@ async function enliven() {
     const photo = block.kind === "moment" ? block.photo : block.kind === "picture" ? block : null;
     if (photo?.track) bus.photos.push(await makePhoto(document.getElementById(photo.id), photo, read, bus));
     if (block.kind === "frames") cameras.set(block.id, makeFrames(figure, block));
-    if (block.kind !== "time_plot" && block.kind !== "seam_plot") continue;
+    if ((block.kind !== "time_plot" && block.kind !== "seam_plot") || !block.live) continue;
     const plot = await makePlot(figure, block, read, bus);
     if (plot === null) continue;
     bus.plots.push(plot);
