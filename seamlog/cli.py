@@ -26,6 +26,11 @@ COMMANDS: dict[str, tuple[str, str]] = {
     ),
     "import": ("seamlog.recorder.importers.command:import_", "Turn a foreign log into a session."),
     "info": ("seamlog.commands.info:info", "Say what is in a session."),
+    "doctor": ("seamlog.commands.doctor:doctor", "Say whether a session is whole."),
+    "recover": (
+        "seamlog.recorder.commands.recover:recover",
+        "Save what is left of a damaged or unfinished one.",
+    ),
     "attach": ("seamlog.commands.attach:attach", "Put photos, procedures, calibrations in."),
     "identify": ("seamlog.analysis.commands.identify:identify", "Find inertia and friction."),
     "replay": ("seamlog.analysis.commands.replay:replay", "Run logged inputs through code again."),

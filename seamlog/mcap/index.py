@@ -33,6 +33,12 @@ class FileIndex:
     metadata: list[MetadataEntry] = field(default_factory=list)
     statistics: Statistics = field(default_factory=Statistics)
     problems: list[str] = field(default_factory=list)
+    gaps: list[tuple[int, int]] = field(default_factory=list)
+    """Bytes from and to that hold nothing whole, where the file had to be walked over."""
+    left_out: list[tuple[int, int, str]] = field(default_factory=list)
+    """Offset, length and fault of damaged records that a walk left out."""
+    summary_start: int | None = None
+    """Where the summary is that all this comes from; None if the file was walked over."""
 
     def learn(self, opcode: int, content: memoryview) -> None:
         """Take in a schema, channel or index record."""
@@ -74,7 +80,11 @@ def load_index(source: FileSource, limits: Limits = LIMITS) -> FileIndex:
         return scan(source, reason, limits)
     if index.statistics.message_count and not index.chunks:
         return scan(source, "", limits)
-    index.profile, index.library = read_header(source)
+    index.summary_start = start
+    try:
+        index.profile, index.library = read_header(source)
+    except SessionError as error:
+        index.problems.append(str(error))
     return index
 
 
@@ -82,6 +92,8 @@ def read_header(source: FileSource) -> tuple[str, str]:
     """Profile and library of a file; `SessionError` if it is cut inside its first record."""
     at = len(records.MAGIC)
     try:
+        if source.data[:at] != records.MAGIC:
+            raise Malformed("the magic bytes are wrong")
         for opcode, offset, length in walk(source.data, at, source.size):
             if opcode != records.HEADER:
                 break

@@ -1,73 +1,162 @@
 """Reads the table of contents of a file whose summary is missing or damaged.
 
 The walk goes from record to record over their heads; a chunk is unpacked only where it must teach
-a channel or has no message index behind it.
+a channel, has no message index behind it or one that speaks of other times. Behind damage the
+walk goes on at the next record that its own CRC proves.
 """
 
 import struct
 from collections.abc import Mapping
+from contextlib import suppress
 
+import numpy as np
+
+from seamlog.errors import SessionError
 from seamlog.limits import Limits
 from seamlog.mcap import parsing, records
 from seamlog.mcap.chunks import BARE, read_chunk
 from seamlog.mcap.index import FileIndex, read_header, walk
 from seamlog.mcap.records import ChunkEntry, Malformed
+from seamlog.mcap.salvage import Salvage, attachment_end, proved_summary
 from seamlog.mcap.source import FileSource
 
 _HEAD = records.RECORD_HEAD.size
 _INDEX = struct.Struct("<HI")
+_ENDS = {records.DATA_END: 4, records.FOOTER: 20}
+_PRIVATE = 128
+"""Opcodes from here on belong to applications and are passed over."""
+_NAMED_GAPS = 5
 
 
 def scan(source: FileSource, problem: str, limits: Limits) -> FileIndex:
-    """Walk over `source`; `problem` says why its summary was not used, "" if it just has none."""
-    profile, library = read_header(source)
-    scanner = _Scanner(source, limits, FileIndex(profile, library))
+    """Walk over `source`; `problem` says why its summary was not used, "" if it just has none.
+
+    Raises `SessionError` if nothing whole is in it.
+    """
+    scanner = _Scanner(source, limits)
     scanner.run()
+    index = scanner.index
+    expected = _learn_from_summary(source, index) if problem else 0
+    rest = _gaps_text(index.gaps)
     if problem:
-        counted = scanner.index.statistics
-        scanner.index.problems.insert(
+        counted = index.statistics
+        share = f" of the {expected} that it held" if expected else ""
+        index.problems.insert(
             0,
-            f"{problem}: {counted.message_count} messages in {counted.chunk_count} whole chunks "
-            f"were found{scanner.rest}",
+            f"{problem}: {counted.message_count} messages{share} in {counted.chunk_count} whole "
+            f"chunks were found{rest}",
         )
-    elif scanner.rest:
-        scanner.index.problems.insert(0, f"{source.path}{scanner.rest}")
-    return scanner.index
+    elif rest:
+        index.problems.insert(0, f"{source.path}{rest}")
+    _note_unknown(source, index)
+    return index
+
+
+def _gaps_text(gaps: list[tuple[int, int]]) -> str:
+    if not gaps:
+        return ""
+    named = [f"{end - start} bytes from byte {start} on" for start, end in gaps[:_NAMED_GAPS]]
+    if len(gaps) > _NAMED_GAPS:
+        rest = sum(end - start for start, end in gaps[_NAMED_GAPS:])
+        named.append(f"{rest} bytes in {len(gaps) - _NAMED_GAPS} more places")
+    return f"; {', '.join(named)} are no whole record and were not read"
+
+
+def _learn_from_summary(source: FileSource, index: FileIndex) -> int:
+    """Take in the channels of a summary that is whole, if not where it should be.
+
+    Returns the number of messages that it counts, 0 without one.
+    """
+    start = proved_summary(source)
+    if start is None:
+        return 0
+    told = FileIndex()
+    with suppress(Malformed):
+        for opcode, offset, length in walk(source.data, start, source.size - records.END_BYTES):
+            told.learn(opcode, source.data[offset + _HEAD : offset + length])
+    index.schemas = told.schemas | index.schemas
+    index.channels = told.channels | index.channels
+    return told.statistics.message_count
+
+
+def _note_unknown(source: FileSource, index: FileIndex) -> None:
+    used = {number for entry in index.chunks for number in entry.index_offsets}
+    for number in sorted(used - index.channels.keys()):
+        count = index.statistics.channel_counts.get(number, 0)
+        index.problems.append(
+            f"{source.path}: {count} messages are of channel {number}; what that was is lost"
+        )
 
 
 class _Scanner:
     """State of one walk."""
 
-    def __init__(self, source: FileSource, limits: Limits, index: FileIndex) -> None:
-        self.source, self.limits, self.index = source, limits, index
-        self.rest = ""
+    def __init__(self, source: FileSource, limits: Limits) -> None:
+        self.source, self.limits = source, limits
+        self.index = FileIndex()
+        self._salvage = Salvage(source, limits)
         self._open: ChunkEntry | None = None
+        self._span: list[int] = []
         self._counts: dict[int, int] = {}
         self._bare: list[int] = []
 
     def run(self) -> None:
-        source, at = self.source, len(records.MAGIC)
+        at: int | None = len(records.MAGIC)
+        lost: SessionError | None = None
+        try:
+            self.index.profile, self.index.library = read_header(self.source)
+        except SessionError as error:
+            lost, at = error, self._resume(0, 0)
+        while at is not None:
+            at = self._walk(at)
+        if lost is not None:
+            if not self.index.chunks and not self.index.attachments:
+                raise lost
+            self.index.problems.append(f"{self.source.path}: its first bytes are damaged")
+
+    def _walk(self, start: int) -> int | None:
+        """Take in records from `start` on; where to go on behind damage, None at the end."""
+        source, at = self.source, start
         try:
             for opcode, offset, length in walk(source.data, at, source.size):
-                if opcode in (records.DATA_END, records.FOOTER):
-                    break
-                self._try(opcode, offset, length)
+                if _ENDS.get(opcode) == length - _HEAD:
+                    self._close_chunk()
+                    self._close_bare(offset)
+                    return None
+                at = offset
+                self._take(opcode, offset, length)
                 at = offset + length
-        except Malformed:
-            left = source.size - at
-            self.rest = f"; {left} bytes from byte {at} on are no whole record and were not read"
-        self._close_chunk()
-        self._close_bare(at)
-
-    def _try(self, opcode: int, offset: int, length: int) -> None:
-        try:
-            self._take(opcode, offset, length)
         except Malformed as error:
-            self._leave_out(f"the record at byte {offset} ({length} bytes)", error)
+            self._close_chunk()
+            is_cut = at + _HEAD > source.size or _is_head(source.data, at, 1 << 62)
+            self._close_bare(at if is_cut else self._last_bare(at))
+            return self._go_on(at, error)
+        self._close_chunk()
+        self._close_bare(source.size)
+        return None
 
-    def _leave_out(self, what: str, error: Malformed) -> None:
+    def _go_on(self, at: int, error: Malformed) -> int | None:
+        """Behind a record whose frame holds, else behind the next proved one's beginning."""
+        data, size = self.source.data, self.source.size
+        if _is_head(data, at, size):
+            length = _HEAD + records.RECORD_HEAD.unpack_from(data, at)[1]
+            if at + length == size or _is_head(data, at + length, size):
+                self._leave_out("record", at, length, error)
+                return at + length
+        return self._resume(at, at + 1)
+
+    def _resume(self, gap: int, start: int) -> int | None:
+        found = self._salvage.next_proved(start)
+        end = self.source.size if found is None else found
+        if end > gap:
+            self.index.gaps.append((gap, end))
+        return found
+
+    def _leave_out(self, what: str, offset: int, length: int, error: Malformed) -> None:
+        self.index.left_out.append((offset, length, str(error)))
         self.index.problems.append(
-            f"{self.source.path}: {what} is damaged and was left out: {error}"
+            f"{self.source.path}: the {what} at byte {offset} ({length} bytes) is damaged and was "
+            f"left out: {error}"
         )
 
     def _take(self, opcode: int, offset: int, length: int) -> None:
@@ -90,63 +179,93 @@ class _Scanner:
         elif opcode == records.METADATA:
             name, _ = parsing.parse_metadata(content)
             self.index.metadata.append(records.MetadataEntry(offset, length, name))
+        elif opcode != records.HEADER and opcode < _PRIVATE:
+            raise Malformed(f"no record of kind {opcode} belongs here")
 
     def _take_message_index(self, offset: int, length: int, content: memoryview) -> None:
-        if self._open is None or len(content) < _INDEX.size:
-            return
+        if len(content) < _INDEX.size:
+            raise Malformed("a message index has no head")
         channel_id, size = _INDEX.unpack_from(content)
+        if size != len(content) - _INDEX.size or size % 16:
+            raise Malformed("a message index does not fill its record")
+        if self._open is None:
+            return
         offsets = {**self._open.index_offsets, channel_id: offset}
         self._open = self._open._replace(
             index_offsets=offsets, index_length=self._open.index_length + length
         )
         self._counts[channel_id] = size // 16
+        if size:
+            times = np.frombuffer(content, "<u8", offset=_INDEX.size)[::2]
+            self._span += (int(times.min()), int(times.max()))
 
     def _take_message(self, offset: int, content: memoryview) -> None:
         if len(content) < 22:
             raise Malformed("a message has no head")
         if not self._bare:
-            self._bare = [offset, 1 << 64, 0]
+            self._bare = [offset, offset, 1 << 64, 0]
         log_time = int.from_bytes(content[6:14], "little")
-        self._bare[1:] = min(self._bare[1], log_time), max(self._bare[2], log_time)
+        self._bare[1:] = offset, min(self._bare[2], log_time), max(self._bare[3], log_time)
         channel_id = int.from_bytes(content[:2], "little")
         self._counts[channel_id] = self._counts.get(channel_id, 0) + 1
+
+    def _last_bare(self, at: int) -> int:
+        """Where the last message outside chunks begins: its length led to what is no record."""
+        if not self._bare:
+            return at
+        content = self.source.data[self._bare[1] + _HEAD :]
+        self._counts[int.from_bytes(content[:2], "little")] -= 1
+        return self._bare[1]
 
     def _close_bare(self, end: int) -> None:
         if not self._bare:
             return
-        start, first, last = self._bare
-        offsets = dict.fromkeys(self._counts, 0)
+        start, _, first, last = self._bare
+        counts = {number: count for number, count in self._counts.items() if count}
         size = end - start
-        entry = ChunkEntry(first, last, start, size, offsets, 0, BARE, size, size)
-        self._bare = []
-        self._note(entry, self._counts)
+        self._bare, self._counts = [], {}
+        if counts:
+            offsets = dict.fromkeys(counts, 0)
+            entry = ChunkEntry(first, last, start, size, offsets, 0, BARE, size, size)
+            self._note(entry, counts)
 
     def _close_chunk(self) -> None:
         entry, self._open = self._open, None
+        span, self._span = self._span, []
         if entry is None:
             return
         known = self.index.channels
-        if not entry.index_offsets or any(n not in known for n in entry.index_offsets):
+        told = (min(span), max(span)) if span else ()
+        if told != (entry.start_ns, entry.end_ns) or any(
+            number not in known for number in entry.index_offsets
+        ):
             try:
                 entry = self._learn(entry)
             except Malformed as error:
                 self._counts = {}
-                self._leave_out(f"the chunk at byte {entry.offset} ({entry.length} bytes)", error)
+                self._leave_out("chunk", entry.offset, entry.length, error)
                 return
         self._note(entry, self._counts)
 
     def _learn(self, entry: ChunkEntry) -> ChunkEntry:
-        """Read a chunk's channels, and its counts where no message index follows it."""
+        """Read a chunk's channels, counts and times, where nothing else tells them for sure."""
         data = read_chunk(self.source, entry, self.limits)
         counts: dict[int, int] = {}
+        start, end = 1 << 64, 0
         for opcode, offset, length in walk(data, 0, len(data)):
             if opcode == records.MESSAGE:
+                if length < 31:
+                    raise Malformed("a message has no head")
                 channel_id = int.from_bytes(data[offset + _HEAD : offset + _HEAD + 2], "little")
                 counts[channel_id] = counts.get(channel_id, 0) + 1
+                log_time = int.from_bytes(data[offset + 15 : offset + 23], "little")
+                start, end = min(start, log_time), max(end, log_time)
             else:
                 self.index.learn(opcode, data[offset + _HEAD : offset + length])
         self._counts = counts
-        return entry._replace(index_offsets={n: entry.index_offsets.get(n, 0) for n in counts})
+        offsets = {number: entry.index_offsets.get(number, 0) for number in counts}
+        span = {"start_ns": start, "end_ns": end} if counts else {}
+        return entry._replace(index_offsets=offsets, **span)
 
     def _note(self, entry: ChunkEntry, counts: Mapping[int, int]) -> None:
         self.index.chunks.append(entry)
@@ -154,6 +273,14 @@ class _Scanner:
         for channel_id, count in counts.items():
             self.index.statistics.add(channel_id, count, entry.start_ns, entry.end_ns)
         self._counts = {}
+
+
+def _is_head(data: memoryview, at: int, end: int) -> bool:
+    """True if the head of a record of MCAP that ends before `end` stands at `at`."""
+    if at + _HEAD > len(data):
+        return False
+    opcode, length = records.RECORD_HEAD.unpack_from(data, at)
+    return 0 < opcode <= records.DATA_END and length <= end - at - _HEAD
 
 
 def _entry(offset: int, length: int, content: memoryview) -> ChunkEntry:
@@ -174,6 +301,7 @@ def _entry(offset: int, length: int, content: memoryview) -> ChunkEntry:
 
 
 def _attachment(offset: int, length: int, content: memoryview) -> records.AttachmentEntry:
+    attachment_end(content)
     cursor = parsing.Cursor(content)
     log_time, create_time = cursor.u64(), cursor.u64()
     name, media_type = cursor.string(), cursor.string()

@@ -7,6 +7,9 @@ from pathlib import Path
 from seamlog.errors import SessionError
 from seamlog.mcap.records import MAGIC, RECORD_HEAD, Malformed
 
+_PAGE = 512
+"""What a disk loses at once, and fills with zeros."""
+
 
 class FileSource:
     """The bytes of a file; raises `SessionError` if it cannot be MCAP."""
@@ -22,7 +25,7 @@ class FileSource:
                 )
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self._data: memoryview | None = memoryview(self._map)
-        if self.data[: len(MAGIC)] != MAGIC:
+        if not _may_be_mcap(self.data):
             self.close()
             raise SessionError(
                 f"{path} is no MCAP file (byte 0 does not begin with its magic); "
@@ -52,3 +55,12 @@ class FileSource:
             with suppress(BufferError):
                 data.release()
                 self._map.close()
+
+
+def _may_be_mcap(data: memoryview) -> bool:
+    """True also where a damaged start does not hide that the rest is MCAP."""
+    start = bytes(data[: len(MAGIC)])
+    if start == MAGIC or data[-len(MAGIC) :] == MAGIC:
+        return True
+    alike = sum(one == other for one, other in zip(start, MAGIC, strict=False))
+    return alike >= len(MAGIC) // 2 or (len(data) > _PAGE and not any(data[:_PAGE]))
