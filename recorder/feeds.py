@@ -9,8 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from seamlog.mcap.records import Buffer
+
 from .accounts import Account, ring_account
-from .mcap_writer import CHUNK_BYTES, CHUNK_S, SessionFile
+from .mcap_writer import CHUNK_BYTES, CHUNK_S
 from .ring import (
     HEAD,
     HIGH_WATER_PPM,
@@ -53,6 +55,21 @@ def note_high_water(ring: Ring, filled: float) -> None:
         ring.words[HIGH_WATER_PPM] = parts
 
 
+class ChunkSink(Protocol):
+    """Where the chunks go: the session being recorded, or one being recovered."""
+
+    def write_chunk(
+        self,
+        channel_id: int,
+        data: Buffer,
+        log_times_ns: NDArray[np.uint64],
+        offsets: NDArray[np.uint64],
+        compression: str,
+    ) -> None:
+        """Write whole records as a chunk that stands alone; after an `OSError` it is not there."""
+        ...
+
+
 class Feed(Protocol):
     """Takes messages out of one ring and writes them."""
 
@@ -78,7 +95,7 @@ class FixedFeed:
     """Feed of a ring of fixed stride: a chunk is a stretch of the ring as it stands."""
 
     def __init__(
-        self, channel_id: int, topic: str, producer: str, ring: Ring, file: SessionFile
+        self, channel_id: int, topic: str, producer: str, ring: Ring, file: ChunkSink
     ) -> None:
         self.channel_id = channel_id
         self.topic = topic

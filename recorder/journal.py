@@ -30,7 +30,7 @@ class Journal:
 
     def status(self, accounts: list[Account], free_bytes: int, log_time_ns: int) -> None:
         """Write one message per account."""
-        rows = (_status_values(account, free_bytes) for account in accounts)
+        rows = (status_values(account, free_bytes) for account in accounts)
         payloads = [encode(_STATUS, (log_time_ns, *values)) for values in rows]
         self._write(STATUS_ID, payloads, log_time_ns)
 
@@ -46,7 +46,8 @@ class Journal:
         self._sequences[channel_id] = first + len(records)
 
 
-def _status_values(account: Account, free_bytes: int) -> tuple[object, ...]:
+def status_values(account: Account, free_bytes: int) -> tuple[object, ...]:
+    """Values of a `/seamlog/recorder` message behind its stamp."""
     return (
         account.topic,
         account.offered,

@@ -8,8 +8,8 @@ import numpy as np
 from seamlog.mcap.records import Buffer
 
 from .accounts import Account, ring_account
-from .feeds import Gaps, note_high_water
-from .mcap_writer import CHUNK_BYTES, CHUNK_S, SessionFile
+from .feeds import ChunkSink, Gaps, note_high_water
+from .mcap_writer import CHUNK_BYTES, CHUNK_S
 from .ring import (
     HEAD,
     LOST,
@@ -79,7 +79,7 @@ class VaryingFeed:
         topic: str,
         producer: str,
         ring: Ring,
-        file: SessionFile,
+        file: ChunkSink,
         encode: Encode | None = None,
         is_urgent: Callable[[memoryview], bool] | None = None,
     ) -> None:
@@ -92,8 +92,8 @@ class VaryingFeed:
         self._producer = producer
         self._encode = encode
         self._is_urgent = is_urgent
-        self._read = 0
-        self._seen = 0
+        self._read = int(ring.words[TAIL])
+        self._seen = int(ring.words[WRITTEN] + ring.words[LOST])
         self._batch = _Batch()
         self._oldest_s = 0.0
 

@@ -68,23 +68,35 @@ class Courses:
             yield from _backwards(frame, heads, place)
 
 
-def _sequence_gaps(
-    frame: "Examination", course: Course, heads: NDArray[Any], place: dict[str, Any]
-) -> Iterator[Finding]:
-    sequences = heads["sequence"].astype(np.int64)
+def iter_missing(heads: NDArray[Any]) -> Iterator[tuple[int, int]]:
+    """Where sequences go on by more than one: position in `heads` and messages that are missing.
+
+    Negative where they go back. Nothing where they do not count the messages at all.
+    """
+    sequences: NDArray[np.int64] = heads["sequence"].astype(np.int64)
     steps = np.diff(sequences) % _SEQUENCES
-    if (steps == 1).mean() < _COUNTED and len(steps) > 1:
+    if len(steps) > 1 and (steps == 1).mean() < _COUNTED:
         return
     for at in np.flatnonzero(steps != 1).tolist():
         step = int(steps[at])
-        span = {"start_ns": int(heads["log_time"][at]), "end_ns": int(heads["log_time"][at + 1])}
-        pair = f"{int(sequences[at])} to {int(sequences[at + 1])}"
         if 1 < step < _SEQUENCES // 2:
-            course.missing += step - 1
-            cause = f"sequence {pair}: {step - 1} messages were dropped or lost here"
+            yield at, step - 1
+        elif len(steps) > 1:
+            yield at, -1
+
+
+def _sequence_gaps(
+    frame: "Examination", course: Course, heads: NDArray[Any], place: dict[str, Any]
+) -> Iterator[Finding]:
+    for at, missing in iter_missing(heads):
+        span = {"start_ns": int(heads["log_time"][at]), "end_ns": int(heads["log_time"][at + 1])}
+        pair = f"{heads['sequence'][at]} to {heads['sequence'][at + 1]}"
+        if missing > 0:
+            course.missing += missing
+            cause = f"sequence {pair}: {missing} messages were dropped or lost here"
             action = "see the recorder's accounts; a faster disk or fewer topics avoid drops"
             yield frame.finding("sequence-gap", Severity.ERROR, cause, action, **place, **span)
-        elif len(steps) > 1:
+        else:
             cause = f"sequence {pair}: messages are repeated or out of order"
             action = "two recordings may have been joined; look at the times"
             yield frame.finding("sequence-back", Severity.WARNING, cause, action, **place, **span)

@@ -1,9 +1,11 @@
 """Examines the build of one MCAP file: every CRC, and everything that is told twice compared."""
 
 import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
+
+from zlib_ng.zlib_ng import crc32
 
 from seamlog.errors import LimitExceeded, SessionError
 from seamlog.findings import Finding, Severity
@@ -12,6 +14,7 @@ from seamlog.mcap import records
 from seamlog.mcap.attachments import read_attachment
 from seamlog.mcap.index import FileIndex, load_index
 from seamlog.mcap.records import ChunkEntry
+from seamlog.mcap.salvage import proved_summary
 from seamlog.mcap.scan import scan
 from seamlog.mcap.source import FileSource
 
@@ -35,14 +38,15 @@ class Examination:
         yield from self._end()
         yield from self._gaps()
         yield from self._attachments()
-        start = self.told.summary_start
+        start = self.told.summary_start or proved_summary(self.source)
         if start is not None:
             yield from self._data_crc(start)
+        if self.told.summary_start is not None:
             yield from self._rows(self.told, self.found)
             yield from self._statistics()
 
     def finding(
-        self, name: str, severity: Severity, cause: str, action: str, **place: int | str | None
+        self, name: str, severity: Severity, cause: str, action: str, **place: Any
     ) -> Finding:
         """A finding about this file."""
         return replace(Finding(name, severity, self.source.path, cause, action), **place)
@@ -101,7 +105,7 @@ class Examination:
             yield self.finding("data-end", Severity.WARNING, cause, RECOVER, offset=max(at, 0))
             return
         (stored,) = struct.unpack_from("<I", self.source.data, summary_start - 4)
-        if stored and zlib.crc32(self.source.data[:at]) != stored:
+        if stored and crc32(self.source.data[:at]) != stored:
             cause = "the CRC over all data is wrong: something in front of the summary has changed"
             yield self.finding("data-crc", Severity.ERROR, cause, RECOVER, offset=0, length=at)
 

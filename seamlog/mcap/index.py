@@ -37,6 +37,8 @@ class FileIndex:
     """Bytes from and to that hold nothing whole, where the file had to be walked over."""
     left_out: list[tuple[int, int, str]] = field(default_factory=list)
     """Offset, length and fault of damaged records that a walk left out."""
+    expected: dict[int, int] = field(default_factory=dict)
+    """Channel id to the number of messages that a proved summary counts."""
     summary_start: int | None = None
     """Where the summary is that all this comes from; None if the file was walked over."""
 
@@ -80,7 +82,7 @@ def load_index(source: FileSource, limits: Limits = LIMITS) -> FileIndex:
         return scan(source, reason, limits)
     if index.statistics.message_count and not index.chunks:
         return scan(source, "", limits)
-    index.summary_start = start
+    index.summary_start, index.expected = start, dict(index.statistics.channel_counts)
     try:
         index.profile, index.library = read_header(source)
     except SessionError as error:

@@ -6,10 +6,10 @@ summary only when the footer's CRC fits; whole MCAP files inside attachments are
 
 import re
 import struct
-import zlib
 from collections.abc import Iterator
 
 import numpy as np
+from zlib_ng.zlib_ng import crc32
 
 from seamlog.errors import LimitExceeded
 from seamlog.limits import Limits
@@ -79,7 +79,7 @@ class Salvage:
         limit = self.limits.chunk_bytes
         self._left -= min(head.uncompressed_size, limit)
         data = decompress(body, head.compression, head.uncompressed_size, limit)
-        proved = zlib.crc32(data) == head.crc
+        proved = crc32(data) == head.crc
         self._left += min(head.uncompressed_size, limit) if proved else 0
         return proved
 
@@ -87,7 +87,7 @@ class Salvage:
         end = attachment_end(content)
         (stored,) = struct.unpack_from("<I", content, end)
         self._left -= end
-        return bool(stored) and zlib.crc32(content[:end]) == stored
+        return bool(stored) and crc32(content[:end]) == stored
 
     def _candidates(self, start: int) -> Iterator[int]:
         """Places where a chunk or attachment of less than 2**40 bytes may begin."""
@@ -125,6 +125,6 @@ def proved_summary(source: FileSource) -> int | None:
     places = [match.start() for match in _DATA_END.finditer(data)]
     for place in reversed(places[-8:]):
         start = place + _HEAD + 4
-        if zlib.crc32(data[start : end - 4]) == stored:
+        if crc32(data[start : end - 4]) == stored:
             return start
     return None

@@ -76,6 +76,7 @@ def _learn_from_summary(source: FileSource, index: FileIndex) -> int:
             told.learn(opcode, source.data[offset + _HEAD : offset + length])
     index.schemas = told.schemas | index.schemas
     index.channels = told.channels | index.channels
+    index.expected = told.statistics.channel_counts
     return told.statistics.message_count
 
 
@@ -139,7 +140,7 @@ class _Scanner:
         """Behind a record whose frame holds, else behind the next proved one's beginning."""
         data, size = self.source.data, self.source.size
         if _is_head(data, at, size):
-            length = _HEAD + records.RECORD_HEAD.unpack_from(data, at)[1]
+            length = _HEAD + int(records.RECORD_HEAD.unpack_from(data, at)[1])
             if at + length == size or _is_head(data, at + length, size):
                 self._leave_out("record", at, length, error)
                 return at + length
@@ -264,8 +265,9 @@ class _Scanner:
                 self.index.learn(opcode, data[offset + _HEAD : offset + length])
         self._counts = counts
         offsets = {number: entry.index_offsets.get(number, 0) for number in counts}
-        span = {"start_ns": start, "end_ns": end} if counts else {}
-        return entry._replace(index_offsets=offsets, **span)
+        if counts:
+            entry = entry._replace(start_ns=start, end_ns=end)
+        return entry._replace(index_offsets=offsets)
 
     def _note(self, entry: ChunkEntry, counts: Mapping[int, int]) -> None:
         self.index.chunks.append(entry)
@@ -280,7 +282,7 @@ def _is_head(data: memoryview, at: int, end: int) -> bool:
     if at + _HEAD > len(data):
         return False
     opcode, length = records.RECORD_HEAD.unpack_from(data, at)
-    return 0 < opcode <= records.DATA_END and length <= end - at - _HEAD
+    return bool(0 < opcode <= records.DATA_END and length <= end - at - _HEAD)
 
 
 def _entry(offset: int, length: int, content: memoryview) -> ChunkEntry:

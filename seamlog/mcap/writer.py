@@ -157,7 +157,7 @@ class FileWriter:
         end = max(int(times.max()) for times, _ in indexes.values())
         front = records.chunk_head(start, end, size, crc, compression, stored)
         length = len(front) + stored
-        packed = [_message_index(number, *rows) for number, rows in indexes.items()]
+        packed = [message_index(number, *rows) for number, rows in indexes.items()]
         ends = np.cumsum([self._size + length, *map(len, packed)]).tolist()
         places = dict(zip(indexes, ends, strict=False))
         entry = ChunkEntry(
@@ -183,6 +183,12 @@ class FileWriter:
         moved = {number: offset + shift for number, offset in entry.index_offsets.items()}
         self._write([raw])
         self._note(entry._replace(offset=entry.offset + shift, index_offsets=moved), counts)
+
+    def copy_attachment(self, entry: AttachmentEntry, raw: Buffer) -> None:
+        """Copy an attachment of another file as it is, with the CRC it has: `raw` is its record."""
+        at = self._size
+        self._write([raw])
+        self._attachments.append(entry._replace(offset=at))
 
     def _note(self, entry: ChunkEntry, counts: Mapping[int, int]) -> None:
         self._chunks.append(records.chunk_index(entry))
@@ -264,9 +270,10 @@ def _joined(head: bytes, data: Buffer, compression: str) -> Buffer:
     return b"".join((head, data)) if head and compression else data
 
 
-def _message_index(
+def message_index(
     channel_id: int, log_times_ns: NDArray[np.uint64], offsets: NDArray[np.uint64]
 ) -> bytes:
+    """A message index record: the log times and the offsets of a channel in its chunk."""
     rows = np.empty((len(offsets), 2), "<u8")
     rows[:, 0] = log_times_ns
     rows[:, 1] = offsets

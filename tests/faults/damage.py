@@ -3,6 +3,7 @@
 import random
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def write_weld(path: Path, seconds: int = 12) -> Expected:
     generator = np.random.default_rng(7)
     count = 1000 * seconds
     stamps = START_NS + np.arange(count, dtype=np.int64) * 1_000_000
-    columns = {"stamp_ns": stamps, "log_time_ns": stamps + 11}
+    columns: dict[str, Any] = {"stamp_ns": stamps, "log_time_ns": stamps + 11}
     columns |= {name: generator.normal(size=count) for name in ENCODER.field_names[1:]}
     pictures = [generator.integers(0, 256, 2000, np.uint8) for _ in range(10 * seconds)]
     with path.open("xb", buffering=0) as file:
