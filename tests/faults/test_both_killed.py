@@ -1,10 +1,9 @@
-"""Live loop and recorder killed together: what `recover` brings back, with and without rings."""
+"""Live loop and recorder killed together: what `recover` brings back of file and rings."""
 
 import os
 import random
 import shutil
 import signal
-import statistics
 import struct
 import subprocess
 import sys
@@ -22,21 +21,20 @@ from seamlog.recorder.recovery import recover
 from tests.recorder.sessions import final_accounts, read_attachments, read_metadata, read_session
 
 LOOP = Path(__file__).with_name("doomed_loop.py")
-QUICK, LONG = 6, 200
+QUICK, LONG = 4, 200
 RATES = (1000, 100, 10, 1)
 
 
 class Death(NamedTuple):
-    """How far the loop had come; times are log times."""
+    """How far the loop had come."""
 
     partial: Path
     encoder: int
     pictures: int
-    killed_ns: int
 
 
 @contextmanager
-def killed(folder: Path, rate_hz: int, seed: int, least_s: float = 0.05) -> Iterator[Death]:
+def killed(folder: Path, rate_hz: int, seed: int) -> Iterator[Death]:
     """Both processes killed at a random time, the recorder and the loop in random order."""
     dice = random.Random(seed)
     session, counters = folder / "weld.mcap", folder / "counters"
@@ -45,18 +43,17 @@ def killed(folder: Path, rate_hz: int, seed: int, least_s: float = 0.05) -> Iter
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as loop:
         assert loop.stdout is not None
         assert loop.stdout.readline() == "ready\n"
-        time.sleep(dice.uniform(least_s, least_s + (0.9 if rate_hz >= 100 else 2.5)))
+        time.sleep(dice.uniform(0.05, 0.9 if rate_hz >= 100 else 2.5))
         pids = [loop.pid, struct.unpack("<3Q", counters.read_bytes())[2]]
         for pid in dice.sample(pids, 2):
             os.kill(pid, signal.SIGKILL)
-        killed_ns = time.time_ns()
     wait_for_end(pids[1])
     encoder, pictures, _ = struct.unpack("<3Q", counters.read_bytes())
     partial = folder / "weld.mcap.part"
     if (folder / "weld.mcap").exists():
         # The recorder was killed last and had just finished.
         partial = folder / "weld.mcap"
-    yield Death(partial, encoder, pictures, killed_ns)
+    yield Death(partial, encoder, pictures)
 
 
 def wait_for_end(pid: int) -> None:
@@ -104,31 +101,9 @@ def check_rings(folder: Path, rate_hz: int, seed: int) -> None:
         assert not rings.exists()
 
 
-def lost_s(folder: Path, rate_hz: int, seed: int) -> float:
-    """Seconds before the death from which on accepted messages are lost, rings gone as well."""
-    with killed(folder, rate_hz, seed, least_s=1.0) as death:
-        shutil.rmtree(rings_of(death), ignore_errors=True)
-        output = folder / "out.mcap"
-        recover(death.partial, output)
-        rows = read_session(output).get("/table/encoder", [])
-        assert [row.sequence for row in rows] == list(range(len(rows)))
-        missing = death.encoder - len(rows)
-        assert missing >= -1
-        if missing <= 0:
-            return 0.0
-        last_ns = rows[-1].log_time_ns if rows else death.killed_ns - 10**9
-        return (death.killed_ns - last_ns) / 1e9 if rate_hz >= 100 else missing / rate_hz
-
-
 @pytest.mark.parametrize("seed", range(QUICK))
 def test_nothing_is_lost_while_the_rings_are_there(tmp_path: Path, seed: int) -> None:
     check_rings(tmp_path, RATES[seed % 2], seed)
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_little_is_lost_without_them(tmp_path: Path, seed: int) -> None:
-    # Other jobs may hold the recorder process up for a while; the figure is the long form's.
-    assert lost_s(tmp_path, 1000, seed) < 2.0
 
 
 def test_the_command_takes_name_and_rings(tmp_path: Path) -> None:
@@ -144,22 +119,10 @@ def test_the_command_takes_name_and_rings(tmp_path: Path) -> None:
 
 
 @pytest.mark.soak
-def test_both_killed_two_hundred_times(tmp_path: Path) -> None:
-    losses = []
+def test_both_killed_and_recovered_two_hundred_times(tmp_path: Path) -> None:
     for seed in range(LONG):
         folder = tmp_path / str(seed)
         folder.mkdir()
-        rate = RATES[seed % len(RATES)] if seed % 20 == 0 else RATES[seed % 2]
-        if seed % 2:
-            check_rings(folder, rate, seed)
-        else:
-            losses.append(lost_s(folder, RATES[seed // 2 % 2], seed))
+        check_rings(folder, RATES[seed % 2] if seed % 10 else RATES[2 + seed // 10 % 2], seed)
         shutil.rmtree(folder)
-    losses.sort()
-    median, most = statistics.median(losses), losses[-1]
-    print(
-        f"\nboth killed {LONG} times: with rings 0 lost in {LONG - len(losses)}; without rings "
-        f"median {1e3 * median:.0f} ms, max {1e3 * most:.0f} ms"
-    )
-    assert median <= 0.060
-    assert most <= 0.120
+    print(f"\nboth killed {LONG} times: 0 messages lost after recover, rings removed")
