@@ -142,14 +142,19 @@ def _band(
 def _by_unit(columns: Columns, units: dict[str, str]) -> list[list[str]]:
     groups: dict[str, list[str]] = {}
     for name, values in columns.items():
-        if name in AXES or name.startswith(("u_", "band_low_", "band_high_")):
-            continue
-        if values.dtype.kind not in "fiu" or not np.isfinite(values.astype(np.float64)).any():
+        if not is_curve(name, values):
             continue
         unit = units.get(name) or split_unit(name)[1]
         own = "difference " if split_unit(name)[0].endswith(_DIFFERENCES) else ""
         groups.setdefault(own + (unit or name), []).append(name)
     return list(groups.values())
+
+
+def is_curve(name: str, values: NDArray[Any]) -> bool:
+    """Whether a column is to be drawn: numbers that are no axis and no band of another."""
+    if name in AXES or name.startswith(("u_", "band_low_", "band_high_")):
+        return False
+    return values.dtype.kind in "fiu" and bool(np.isfinite(values.astype(np.float64)).any())
 
 
 def _axis_label(words: str, unit: str) -> str:

@@ -118,7 +118,7 @@ class Report:
             seamlog_version=__version__,
             interactive=has_uplot(),
             sections=self._ordered(),
-            links=[link for run in self.runs for link in links_of(run)],
+            links=[] if self._chosen else [link for run in self.runs for link in links_of(run)],
         )
 
     def write(self, path: Path, force: bool = False) -> Document:

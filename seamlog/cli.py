@@ -39,6 +39,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "calibrate": ("seamlog.analysis.commands.calibrate:calibrate", "Pixels to millimetres."),
     "analyze": ("seamlog.analysis.commands.analyze:analyze", "Session and photos to results."),
     "report": ("seamlog.reports.commands:report", "Results to one HTML file."),
+    "compare": ("seamlog.reports.compare_command:compare", "Results beside each other."),
     "demo": ("seamlog.commands.demo:demo", "A virtual weld through the whole chain."),
     "plugins": ("seamlog.commands.plugins:plugins", "List what is pluggable."),
     "env": ("seamlog.commands.env:env", "Versions, for a bug report."),
