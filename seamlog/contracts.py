@@ -121,8 +121,19 @@ class SourceResult:
     files: Mapping[str, bytes] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class Device:
+    """Something that a source could record: what its configuration calls it, and what it is."""
+
+    address: str
+    description: str
+
+
 class Source(Protocol):
     """A source of live data; made as `Factory(config)`, where `Factory.Config` is a pydantic model.
+
+    The factory may have `drivers`, objects with `is_installed` and `advice` that tell what it
+    needs, and `probe() -> list[Device]`.
 
     `pace` is `paced` (wall clock; drops when the ring is full) or `simulated` (its own `clock`,
     faster than real time; the recorder waits when a ring is full and never drops).

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 
 @command()
-@click.option("--source", "name", required=True, help="A source that 'seamlog sources' lists.")
+@click.option("--source", "name", help="A source that 'seamlog sources' lists.")
+@click.option("--listen", metavar="ADDRESS", help="A loop elsewhere, such as tcp://127.0.0.1:5577.")
 @output_option("The session to write, such as weld.mcap.")
 @config_options
 @click.option("--meta", multiple=True, metavar="KEY=VALUE", help="Into the session's metadata.")
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 @storage_options
 @force_option
 def record(
-    name: str,
+    name: str | None,
+    listen: str | None,
     output: Path,
     config: Path | None,
     settings: tuple[str, ...],
@@ -43,7 +45,11 @@ def record(
     from seamlog.files import check_output
 
     values = _read_meta(meta)
-    factory = plugins.load("seamlog.sources", name)
+    if (name is None) == (listen is None):
+        raise UsageError("give either --source or --listen")
+    if listen is not None:
+        settings = (*settings, f"source.address={listen}")
+    factory = plugins.load("seamlog.sources", name or "listen")
     check_output(output, force)
     source = factory(load_config(factory.Config, "source", config, settings))
 

@@ -1,12 +1,13 @@
-"""`seamlog sources`: what can be recorded from, and what is missing for it."""
+"""`seamlog sources`: what can be recorded from here, and what is missing for it."""
 
+from dataclasses import asdict
 from typing import Any
 
 import click
 
 from seamlog import plugins
 from seamlog.command import command, group
-from seamlog.errors import SeamlogError
+from seamlog.errors import SeamlogError, SourceMissing, UsageError
 from seamlog.outcome import Outcome
 
 
@@ -16,7 +17,7 @@ from seamlog.outcome import Outcome
 )
 @click.pass_context
 def sources(context: click.Context) -> Outcome | None:
-    """List the sources that can be recorded."""
+    """List the sources that can be recorded, or probe one for its devices."""
     return None if context.invoked_subcommand else _list_sources()
 
 
@@ -26,7 +27,25 @@ def sources_list() -> Outcome:
     return _list_sources()
 
 
+@command("probe")
+@click.argument("name")
+def sources_probe(name: str) -> Outcome:
+    """Devices that source NAME finds here; exit code 4 without driver or device."""
+    factory = plugins.load("seamlog.sources", name)
+    _refuse_missing(name, factory)
+    if not hasattr(factory, "probe"):
+        raise UsageError(f"source {name} has no devices to look for; just record it")
+    devices = factory.probe()
+    if not devices:
+        raise SourceMissing(f"source {name} works here, and no device is connected")
+    wide = max(len(device.address) for device in devices)
+    lines = [f"{device.address:<{wide}}  {device.description}" for device in devices]
+    rows = [asdict(device) for device in devices]
+    return Outcome("seamlog.sources.probe", "\n".join(lines), {"source": name, "devices": rows})
+
+
 sources.add_command(sources_list)
+sources.add_command(sources_probe)
 
 
 def _list_sources() -> Outcome:
@@ -45,5 +64,14 @@ def _source(name: str) -> dict[str, Any]:
         factory = plugins.load("seamlog.sources", name)
     except (ImportError, AttributeError, SeamlogError) as error:
         return {"name": name, "pace": "?", "available": False, "missing": str(error)}
-    pace = str(getattr(factory, "pace", "?"))
-    return {"name": name, "pace": pace, "available": True, "missing": ""}
+    pace, missing = str(getattr(factory, "pace", "?")), "; ".join(_missing(factory))
+    return {"name": name, "pace": pace, "available": not missing, "missing": missing}
+
+
+def _missing(factory: Any) -> list[str]:
+    return [d.advice for d in getattr(factory, "drivers", ()) if not d.is_installed]
+
+
+def _refuse_missing(name: str, factory: Any) -> None:
+    if missing := _missing(factory):
+        raise SourceMissing(f"source {name}: {'; '.join(missing)}")

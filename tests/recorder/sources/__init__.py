@@ -1,0 +1,1 @@
+"""Sources recorded for real: pty lines, a Modbus server, virtual cameras, video, ZeroMQ."""
