@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 @click.option("--meta", multiple=True, metavar="KEY=VALUE", help="Into the session's metadata.")
 @click.option("--pace", type=click.Choice(["realtime"]), help="Hold a simulated source to time.")
 @click.option("--duration", type=click.FloatRange(min=0, min_open=True), help="End after S s.")
+@click.option("--live", metavar="[HOST:]PORT", help="Show it in Foxglove meanwhile.")
 @storage_options
 @force_option
 def record(
@@ -37,6 +38,7 @@ def record(
     meta: tuple[str, ...],
     pace: str | None,
     duration: float | None,
+    live: str | None,
     storage: "Storage",
     force: bool,
 ) -> Outcome:
@@ -52,6 +54,10 @@ def record(
     factory = plugins.load("seamlog.sources", name or "listen")
     check_output(output, force)
     source = factory(load_config(factory.Config, "source", config, settings))
+    if live is not None:
+        from seamlog.recorder.live import ShownLive
+
+        source = ShownLive(source, output, live)
 
     from seamlog.recorder.session_run import run_source
 
