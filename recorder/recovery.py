@@ -52,7 +52,6 @@ class ChannelRecovery:
     unproved: int = 0
     """Of the kept ones those that no CRC proved: open tail, messages outside chunks."""
     lost: int | None = None
-    reason: str = ""
 
 
 @dataclass(slots=True)

@@ -34,7 +34,7 @@ class Death(NamedTuple):
 
 
 @contextmanager
-def killed(folder: Path, rate_hz: int, seed: int) -> Iterator[Death]:
+def killed(folder: Path, rate_hz: int, seed: int, least_s: float = 0.05) -> Iterator[Death]:
     """Both processes killed at a random time, the recorder and the loop in random order."""
     dice = random.Random(seed)
     session, counters = folder / "weld.mcap", folder / "counters"
@@ -43,7 +43,7 @@ def killed(folder: Path, rate_hz: int, seed: int) -> Iterator[Death]:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as loop:
         assert loop.stdout is not None
         assert loop.stdout.readline() == "ready\n"
-        time.sleep(dice.uniform(0.05, 0.9 if rate_hz >= 100 else 2.5))
+        time.sleep(dice.uniform(least_s, least_s + (0.9 if rate_hz >= 100 else 2.5)))
         pids = [loop.pid, struct.unpack("<3Q", counters.read_bytes())[2]]
         for pid in dice.sample(pids, 2):
             os.kill(pid, signal.SIGKILL)
@@ -107,7 +107,7 @@ def test_nothing_is_lost_while_the_rings_are_there(tmp_path: Path, seed: int) ->
 
 
 def test_the_command_takes_name_and_rings(tmp_path: Path) -> None:
-    with killed(tmp_path, 100, 3) as death:
+    with killed(tmp_path, 100, 3, least_s=1.5) as death:
         rings = rings_of(death)
         assert run(["recover", str(death.partial), "--json"]) == 0
         assert not rings.exists()

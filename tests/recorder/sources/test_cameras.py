@@ -2,6 +2,7 @@
 
 import os
 import threading
+import time
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -82,6 +83,7 @@ class _Stream(BaseHTTPRequestHandler):
             data = cv2.imencode(".jpg", image)[1].tobytes()
             head = f"--x\r\nContent-Type: image/jpeg\r\nContent-Length: {len(data)}\r\n\r\n"
             self.wfile.write(head.encode() + data + b"\r\n")
+            time.sleep(0.02)
 
     def log_message(self, *_: object) -> None:
         return
