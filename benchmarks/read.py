@@ -1,7 +1,8 @@
-"""Reading to columns beside mcap, rosbags, Parquet and the least possible work, CPU time.
+"""Reading to columns beside mcap, rosbags, rerun, Parquet and the least possible work, CPU time.
 
-Data: 10^6 encoder messages (stamp + 2 doubles) as one channel; a mixed session of pictures and
-numbers; the same numbers in the small chunks of a live recording.
+Data: 10^6 messages of 36 bytes (stamp + 3 doubles) as one channel in chunks of 1 MiB; the same in
+the small chunks of a live recording; a mixed session of pictures and numbers; messages of varying
+length as others write them. CRCs are checked, and every reader must come to the same values.
 """
 
 import struct
@@ -21,21 +22,26 @@ import seamlog
 from seamlog.channels import CHANNELS
 from seamlog.mcap.batch import BatchWriter
 from seamlog.mcap.writer import FileWriter
-from seamlog.messages import definition, encode_image
+from seamlog.messages import CdrWriter, definition, encode_image
 
-TOPIC = "/table/encoder"
+TOPIC = "/table/reference"
 START_NS = 1_767_225_600_000_000_000
 LIVE_ROWS = 100
 """Messages per chunk of a live 1 kHz recording: 100 ms."""
 
 
 def columns(count: int) -> dict[str, np.ndarray[Any, Any]]:
-    """An encoder at sensor resolution, 1 kHz."""
+    """Motion at sensor resolution, 1 kHz."""
     phase = np.arange(count) / 1000.0
     position = np.round(0.1 * np.sin(phase), 6)
     noise = np.random.default_rng(0).normal(0, 5e-4, count)
     stamps = START_NS + np.arange(count) * 1_000_000
-    return {"stamp_ns": stamps, "position_m": position, "velocity_m_s": 0.1 * np.cos(phase) + noise}
+    return {
+        "stamp_ns": stamps,
+        "position_m": position,
+        "velocity_m_s": 0.1 * np.cos(phase) + noise,
+        "acceleration_m_s2": -0.1 * np.sin(phase) + 10 * noise,
+    }
 
 
 def write(path: Path, data: dict[str, np.ndarray[Any, Any]], compression: str) -> None:
@@ -87,14 +93,17 @@ def write_mixed(path: Path, data: dict[str, np.ndarray[Any, Any]], frames: int) 
         writer.write_payloads("/camera/image", CHANNELS["/camera/image"], payloads, stamps)
 
 
-def ours(path: Path, window: tuple[int, int] | None = None) -> int:
+Values = np.ndarray[Any, Any]
+
+
+def ours(path: Path, window: tuple[int, int] | None = None) -> Values:
     """Messages read to columns."""
     with seamlog.open_session(path) as session:
         part = session.window(*window) if window else session
-        return len(part.columns(TOPIC)["position_m"])
+        return part.columns(TOPIC)["position_m"]
 
 
-def by_mcap(path: Path, window: tuple[int, int] | None = None) -> int:
+def by_mcap(path: Path, window: tuple[int, int] | None = None) -> Values:
     """The `mcap` package with its ROS 2 decoder, in file order, CRC checked."""
     from mcap_ros2.decoder import DecoderFactory
 
@@ -102,19 +111,37 @@ def by_mcap(path: Path, window: tuple[int, int] | None = None) -> int:
     with path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         items = reader.iter_decoded_messages([TOPIC], log_time_order=bool(window), **limits)
-        return sum(1 for item in items if item.decoded_message.position_m < 9)
+        return np.array([item.decoded_message.position_m for item in items])
 
 
-def by_rosbags(path: Path) -> int:
+def by_rosbags(path: Path) -> Values:
     """rosbags, decoded."""
     from rosbags.highlevel import AnyReader
 
     with AnyReader([path]) as reader:
-        return sum(
-            1
-            for c, _, raw in reader.messages()
-            if reader.deserialize(raw, c.msgtype).position_m < 9
-        )
+        rows = ((c.msgtype, raw) for c, _, raw in reader.messages())
+        return np.array([reader.deserialize(raw, name).position_m for name, raw in rows])
+
+
+def by_rerun(path: Path) -> Values:
+    """rerun's MCAP reader, all fields to numpy."""
+    from rerun.chunk import McapReader
+
+    parts = []
+    for chunk in McapReader(path).stream().to_chunks():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if name.endswith("Reference:message"):
+                struct_array = batch.column(name).flatten()
+                fields = {f.name: struct_array.field(f.name).to_numpy() for f in struct_array.type}
+                parts.append(fields["position_m"])
+    return np.concatenate(parts)
+
+
+def same(found: Values, wanted: Values) -> None:
+    """All readers must come to the same values."""
+    if not np.array_equal(np.sort(found), np.sort(wanted)):
+        raise SystemExit("two readers disagree about the values")
 
 
 def least_work(path: Path) -> Callable[[], int]:
@@ -146,28 +173,40 @@ def single_channel(folder: Path, count: int) -> Iterator[Figure]:
     own = {name: cpu_s(lambda p=path: ours(p)) / count for name, path in paths.items()}
     for name, seconds in own.items():
         yield Figure(f"read {name or 'uncompressed'}", seconds * 1e6, "us/msg")
+    for path in paths.values():
+        same(ours(path), data["position_m"])
     with optional_peer("mcap-ros2-support"):
+        same(by_mcap(few), data["position_m"][: count // 10])
         peer = cpu_s(lambda: by_mcap(few), 2) / (count // 10)
         yield Figure("zstd: mcap in file order, decoded / ours", peer / own["zstd"], "x", ">= 80")
         live = folder / "live.mcap"
         write_live(live, few, count // 10)
+        same(ours(live), data["position_m"][: count // 10])
         ratio = cpu_s(lambda: by_mcap(live), 2) / cpu_s(lambda: ours(live))
         yield Figure("live chunks: mcap / ours", ratio, "x", ">= 30")
     with optional_peer("rosbags"):
+        same(by_rosbags(few), data["position_m"][: count // 10])
         peer = cpu_s(lambda: by_rosbags(few), 2) / (count // 10)
         yield Figure("zstd: rosbags / ours", peer / own["zstd"], "x", ">= 50")
+    with optional_peer("rerun-sdk"):
+        same(by_rerun(paths["zstd"]), data["position_m"])
+        peer = cpu_s(lambda: by_rerun(paths["zstd"]), 3) / count
+        yield Figure("zstd: rerun / ours", peer / own["zstd"], "x", ">= 10")
     ratio = cpu_s(lambda: ours(paths["zstd"])) / cpu_s(least_work(paths["zstd"]))
     yield Figure("zstd: ours / (decompression + crc32)", ratio, "x", "<= 1.3")
-    yield Figure("uncompressed: ours / Parquet", own[""] / parquet(folder, data), "x", "<= 1.3")
+    plain = parquet(folder, data, {"compression": "none", "use_dictionary": False})
+    yield Figure("uncompressed: ours / Parquet, uncompressed", own[""] / plain, "x", "<= 1.3")
+    usual = parquet(folder, data, {})
+    yield Figure("uncompressed: ours / Parquet as pyarrow writes it", own[""] / usual, "x")
 
 
-def parquet(folder: Path, data: dict[str, np.ndarray[Any, Any]]) -> float:
-    """Seconds per row of pyarrow reading the same columns, uncompressed, to numpy."""
+def parquet(folder: Path, data: dict[str, np.ndarray[Any, Any]], options: dict[str, Any]) -> float:
+    """Seconds per row of pyarrow reading the same columns (log time too) to numpy."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     path = folder / "columns.parquet"
-    pq.write_table(pa.table(data), path, compression="none", use_dictionary=False)
+    pq.write_table(pa.table({"log_time_ns": data["stamp_ns"], **data}), path, **options)
 
     def act() -> None:
         table = pq.read_table(path, use_threads=False)
@@ -197,6 +236,134 @@ def mixed(folder: Path, count: int, frames: int) -> Iterator[Figure]:
     yield Figure("picture at a time, warm", warm * 1e3, "ms")
 
 
+JOINT_STATE = """std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+"""
+JOINTS = ("axis_x", "table", "z", "torch_tilt")
+
+
+def write_foreign(path: Path, encoding: str, count: int) -> Values:
+    """Joint states of one to four joints by the mcap package; positions of the first joint."""
+    from mcap.writer import Writer
+
+    encode, schema = ENCODERS[encoding]()
+    values = np.random.default_rng(2).normal(size=(count, 3, len(JOINTS)))
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        channel = writer.register_channel("/joints", encoding, writer.register_schema(*schema))
+        for place in range(count):
+            joints = 1 + place % len(JOINTS)
+            time = START_NS + place * 1_000_003
+            payload = encode(time, joints, values[place])
+            writer.add_message(channel, time, payload, time)
+        writer.finish()
+    return values[:, 0, 0]
+
+
+def cdr_encoder() -> tuple[Callable[..., bytes], tuple[str, str, bytes]]:
+    """sensor_msgs/msg/JointState of ROS 2."""
+
+    def encode(time: int, joints: int, values: Values) -> bytes:
+        message = CdrWriter()
+        message.put("int32", time // 10**9)
+        message.put("uint32", time % 10**9)
+        message.put("string", "base")
+        message.put("string[]", JOINTS[:joints])
+        for row in values:
+            message.put("float64[]", row[:joints].tolist())
+        return message.payload()
+
+    return encode, ("sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE.encode())
+
+
+def protobuf_encoder() -> tuple[Callable[..., bytes], tuple[str, str, bytes]]:
+    """A time stamp and repeated joints, as foxglove.JointStates."""
+    from google.protobuf import descriptor_pb2, timestamp_pb2
+    from google.protobuf.descriptor_pool import Default
+    from google.protobuf.message_factory import GetMessageClass
+
+    file = descriptor_pb2.FileDescriptorProto(name="joints.proto", package="b", syntax="proto3")
+    file.dependency.append("google/protobuf/timestamp.proto")
+    joint = file.message_type.add(name="Joint")
+    joint.field.add(name="name", number=1, type=9, label=1)
+    for number, name in enumerate(("position", "velocity", "effort"), 2):
+        joint.field.add(name=name, number=number, type=1, label=1)
+    states = file.message_type.add(name="Joints")
+    states.field.add(
+        name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp"
+    )
+    states.field.add(name="joints", number=2, type=11, label=3, type_name=".b.Joint")
+    files = descriptor_pb2.FileDescriptorSet(file=[file])
+    timestamp_pb2.DESCRIPTOR.CopyToProto(files.file.add())
+    Default().Add(file)
+    make = GetMessageClass(Default().FindMessageTypeByName("b.Joints"))
+
+    def encode(time: int, joints: int, values: Values) -> bytes:
+        message = make()
+        message.timestamp.FromNanoseconds(time)
+        for name, column in zip(JOINTS[:joints], values.T, strict=False):
+            message.joints.add(name=name, position=column[0], velocity=column[1], effort=column[2])
+        return bytes(message.SerializeToString())
+
+    return encode, ("b.Joints", "protobuf", files.SerializeToString())
+
+
+ENCODERS = {"cdr": cdr_encoder, "protobuf": protobuf_encoder}
+FIRST_JOINT = {
+    "cdr": ["position[0]", "velocity[0]", "effort[0]"],
+    "protobuf": ["joints[0].position", "joints[0].velocity", "joints[0].effort"],
+}
+
+
+def foreign(folder: Path, count: int) -> Iterator[Figure]:
+    """Messages of varying length: the first joint, and every field."""
+    with optional_peer("mcap-ros2-support, mcap-protobuf-support"):
+        from mcap_protobuf.decoder import DecoderFactory as Protobuf
+        from mcap_ros2.decoder import DecoderFactory as Ros2
+
+        for encoding, fields in FIRST_JOINT.items():
+            path, few = folder / f"{encoding}.mcap", folder / f"{encoding}_few.mcap"
+            wanted = write_foreign(path, encoding, count)
+            write_foreign(few, encoding, count // 10)
+            peer = cpu_s(lambda p=few: decoded(p, [Ros2(), Protobuf()]), 2) / (count // 10)
+            same(columns_of(path, fields)[fields[0]], wanted)
+            same(decoded(few, [Ros2(), Protobuf()])[:, 0], columns_of(few, fields)[fields[0]])
+            for name, picked in (("first joint", fields), ("all fields", None)):
+                own = cpu_s(lambda p=path, f=picked: columns_of(p, f)) / count
+                target = ">= 50" if picked else ""
+                yield Figure(f"varying {encoding}, {name}: mcap / ours", peer / own, "x", target)
+
+
+def columns_of(path: Path, fields: list[str] | None) -> dict[str, Values]:
+    """Columns of the joint states."""
+    with seamlog.open_session(path) as session:
+        return session.columns("/joints", fields)
+
+
+def decoded(path: Path, factories: list[Any]) -> Values:
+    """The first joint of every message, decoded by mcap in file order, CRC checked."""
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=factories)
+        items = reader.iter_decoded_messages(["/joints"], log_time_order=False)
+        return np.array([first_joint(item.decoded_message) for item in items])
+
+
+def first_joint(message: Any) -> tuple[float, float, float]:
+    """Position, velocity and effort."""
+    if hasattr(message, "joints"):
+        joint = message.joints[0]
+        return joint.position, joint.velocity, joint.effort
+    return message.position[0], message.velocity[0], message.effort[0]
+
+
 def opening(folder: Path) -> Iterator[Figure]:
     """`seamlog info` on a session of 1 GB, as a whole process."""
     import resource
@@ -222,6 +389,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         figures = [*single_channel(folder, count), *mixed(folder, count // 10, frames)]
+        figures += foreign(folder, count // 5)
         if not chosen.quick:
             figures += opening(folder)
     tell("read: CPU time beside peers in one run", figures, chosen.json)

@@ -14,12 +14,16 @@
     fields.command = { column = "u" }
     fields.saturated = { constant = 0 }
 
-A value is `column * scale + offset` in `unit`, then brought to the unit of the field.
+A value is `column * scale + offset` in `unit`, then brought to the unit of the field. A channel may
+have a `time` table of its own, and needs none where the file states the time of its columns. Fields
+that no topic of the table has go under a topic `/import/...`, with names of one's own; they are
+stored as they are, their units in the channel metadata.
 """
 
 import difflib
+import re
 import tomllib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
@@ -27,11 +31,18 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from seamlog.channels import CHANNELS, STAMP, Channel
+from seamlog.channels import Field as ChannelField
 from seamlog.errors import ConfigError, InputError
 
-from .units import factor_between
+from .units import factor_between, is_unit, spelled
 
 TimeUnit = Literal["s", "ms", "us", "ns", "min"]
+
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+FREE = "/import/"
+"""Topics that begin so have any fields."""
+_FREE_FIELD = re.compile(r"[a-z][a-z0-9_]*")
 
 
 class _Model(BaseModel):
@@ -44,7 +55,7 @@ class TimeMap(_Model):
     column: str | None = None
     unit: TimeUnit = "s"
     rate_hz: float | None = Field(None, gt=0)
-    start: datetime = datetime(1970, 1, 1, tzinfo=UTC)
+    start: datetime = EPOCH
 
     @model_validator(mode="after")
     def _one_source(self) -> "TimeMap":
@@ -80,6 +91,7 @@ class ScalarColumn(_Model):
 class ChannelMap(_Model):
     """Fields and metadata of one topic."""
 
+    time: TimeMap | None = None
     fields: dict[str, FieldMap] = Field(min_length=1)
     metadata: dict[str, str | ScalarColumn] = {}
 
@@ -88,12 +100,27 @@ class ColumnMap(_Model):
     """A whole map; `source` says where the data come from, for the session's metadata."""
 
     source: str = ""
-    time: TimeMap
+    time: TimeMap | None = None
     channels: dict[str, ChannelMap] = Field(min_length=1)
 
 
-def load_column_map(path: Path, columns: Collection[str]) -> ColumnMap:
+def channel_of(topic: str, entry: ChannelMap) -> Channel:
+    """The channel of the table, or the one that a free topic's fields make."""
+    if topic in CHANNELS:
+        return CHANNELS[topic]
+    name = "".join(part.capitalize() for part in re.split(r"\W|_", topic.removeprefix(FREE)))
+    fields = [
+        ChannelField("float64", key, item.unit or "", "") for key, item in entry.fields.items()
+    ]
+    return Channel(topic, f"seamlog_msgs/msg/Import{name}", (STAMP, *fields), None, "imported")
+
+
+def load_column_map(
+    path: Path, columns: Collection[str], units: Mapping[str, str] | None = None
+) -> ColumnMap:
     """Read a map and check it against the names in the file.
+
+    `units` are those that the file states for its columns; they hold where the map gives none.
 
     Raises `ConfigError` with every fault at once, `InputError` if the map is not there.
     """
@@ -103,6 +130,7 @@ def load_column_map(path: Path, columns: Collection[str]) -> ColumnMap:
         raise InputError(f"{path}: no such column map") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path} is not valid TOML: {error}") from error
+    _state_units(tree, units or {})
     faults = [*_name_faults(tree), *_column_faults(tree, columns)]
     try:
         found = ColumnMap.model_validate(tree)
@@ -113,6 +141,23 @@ def load_column_map(path: Path, columns: Collection[str]) -> ColumnMap:
         listed = "\n".join(f"  {fault}" for fault in faults)
         raise ConfigError(f"{path} has {count}:\n{listed}", tuple(faults))
     return found
+
+
+def _state_units(tree: dict[str, Any], units: Mapping[str, str]) -> None:
+    """Put the file's units where the map has none and changes nothing of the value."""
+    for topic, name, value in _field_maps(tree):
+        if not isinstance(value, dict) or "unit" in value or "scale" in value:
+            continue
+        unit = units.get(str(value.get("column")))
+        free = topic.startswith(FREE)
+        if unit and (free or (is_unit(unit) and _wants_unit(topic, name))):
+            value["unit"] = unit if free else spelled(unit)
+
+
+def _wants_unit(topic: str, name: str) -> bool:
+    channel = CHANNELS.get(topic)
+    fields = channel.fields if channel else ()
+    return any(field.name == name and field.unit not in ("", "1") for field in fields)
 
 
 def mappable(channel: Channel) -> list[str]:
@@ -142,12 +187,14 @@ def _name_faults(tree: dict[str, Any]) -> Iterator[str]:
     channels = tree.get("channels")
     own = [topic for topic, channel in CHANNELS.items() if channel.schema.startswith("seamlog")]
     for topic in channels if isinstance(channels, dict) else ():
-        if topic not in own:
+        if topic not in own and not topic.startswith(FREE):
             yield f"channels.{topic}: no such topic{_hint(topic, own)}"
     for topic, name, value in _field_maps(tree):
+        where = f"channels.{topic}.fields.{name}"
+        if topic.startswith(FREE) and not _FREE_FIELD.fullmatch(name):
+            yield f"{where}: a field name is lower-case letters, digits and _, a letter first"
         if topic not in own:
             continue
-        where = f"channels.{topic}.fields.{name}"
         known = mappable(CHANNELS[topic])
         if name not in known:
             yield f"{where}: no field a column can fill{_hint(name, known)}"
@@ -157,13 +204,14 @@ def _name_faults(tree: dict[str, Any]) -> Iterator[str]:
 
 def _unit_fault(where: str, unit: str, channel: Channel, name: str) -> Iterator[str]:
     wanted = next(field.unit for field in channel.fields if field.name == name)
-    if factor_between(unit, wanted) is None:
+    if factor_between(spelled(unit), wanted) is None:
         yield f"{where}.unit: cannot turn {unit!r} into {wanted!r}; give scale instead"
 
 
 def _column_faults(tree: dict[str, Any], columns: Collection[str]) -> Iterator[str]:
     time = tree.get("time")
     wanted = [("time.column", time.get("column"))] if isinstance(time, dict) else []
+    wanted.extend(_time_columns(tree))
     for topic, name, value in _field_maps(tree):
         if isinstance(value, dict):
             wanted.append((f"channels.{topic}.fields.{name}.column", value.get("column")))
@@ -171,6 +219,14 @@ def _column_faults(tree: dict[str, Any], columns: Collection[str]) -> Iterator[s
     for where, column in wanted:
         if isinstance(column, str) and column not in columns:
             yield f"{where}: the file has no column {column!r}{_hint(column, list(columns))}"
+
+
+def _time_columns(tree: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    channels = tree.get("channels")
+    for topic, entry in channels.items() if isinstance(channels, dict) else ():
+        time = entry.get("time") if isinstance(entry, dict) else None
+        if isinstance(time, dict):
+            yield f"channels.{topic}.time.column", time.get("column")
 
 
 def _metadata_columns(tree: dict[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -184,4 +240,7 @@ def _metadata_columns(tree: dict[str, Any]) -> Iterator[tuple[str, Any]]:
 
 def _hint(name: str, known: list[str]) -> str:
     near = difflib.get_close_matches(name, known, 1)
-    return f"; did you mean {near[0]!r}?" if near else f"; it has {', '.join(known)}"
+    if near:
+        return f"; did you mean {near[0]!r}?"
+    more = f" and {len(known) - 20} more" if len(known) > 20 else ""
+    return f"; it has {', '.join(known[:20])}{more}"

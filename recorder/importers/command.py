@@ -1,6 +1,8 @@
 """`seamlog import`: a foreign log becomes a session, with a loss report."""
 
 from collections.abc import Mapping
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,77 +13,201 @@ from seamlog.errors import InputError, UsageError
 from seamlog.outcome import Outcome
 
 if TYPE_CHECKING:
-    from .column_map import ColumnMap
+    from collections.abc import Iterator
+
+    from .content import Content
     from .conversion import Loss, TopicColumns
+
+BY_SUFFIX = {
+    "csv": "csv txt tsv dat asc",
+    "mat": "mat",
+    "parquet": "parquet pq",
+    "tdms": "tdms",
+    "ros2": "mcap db3 zstd",
+    "ros1": "bag",
+    "video": "mp4 mkv avi mov webm mjpeg mjpg mpg m4v",
+}
+"""Importers of ours and the suffixes they are taken for; a folder is a ROS 2 bag."""
 
 
 @command("import")
 @click.argument("file", type=click.Path(path_type=Path))
-@output_option("The session to write.", required=False)
+@output_option("The session to write; with --guess the map.", required=False)
 @click.option(
     "--map",
     "map_file",
     type=click.Path(path_type=Path),
-    required=True,
-    help="Column map (TOML): which column is which field.",
+    help="Column map (TOML): which column is which field. Bags and videos need none.",
 )
+@click.option("--guess", is_flag=True, help="Propose a column map and say what was guessed.")
 @click.option("--importer", help="Importer by name; default: by the suffix of FILE.")
 @click.option("--dry-run", is_flag=True, help="Report what would be lost; write nothing.")
 @force_option
 def import_(
     file: Path,
     output: Path | None,
-    map_file: Path,
+    map_file: Path | None,
+    guess: bool,
     importer: str | None,
     dry_run: bool,
     force: bool,
 ) -> Outcome:
-    """Turn the foreign log FILE into a session.
+    """Turn the foreign log FILE (or the folder of a ROS 2 bag) into a session.
 
     Nothing is derived on the way: what FILE does not have stays NaN and is listed as absent.
     """
     from seamlog import plugins
     from seamlog.files import check_output
 
+    if output is None and not dry_run and not guess:
+        raise UsageError("say where to write with -o SESSION.mcap, or look first with --dry-run")
+    if not file.exists():
+        raise InputError(f"{file}: no such file")
+    if output is not None and not dry_run:
+        check_output(output, force)
+    reader = plugins.load("seamlog.importers", importer or _importer_for(file))()
+    target = None if dry_run else output
+    if not hasattr(reader, "write"):
+        return _import_table(reader, file, target, map_file, guess, force)
+    if guess or map_file:
+        with _as_session(reader, file) as (content, copied, notes):
+            if guess:
+                return _guess(content, file, target)
+            return _import_mapped(content, file, target, map_file, force, copied, notes)
+    return _import_whole(reader, file, target, force)
+
+
+def _importer_for(file: Path) -> str:
+    suffix = file.suffix.lstrip(".").lower()
+    if file.is_dir():
+        return "ros2"
+    return next((name for name, known in BY_SUFFIX.items() if suffix in known.split()), suffix)
+
+
+def _import_table(
+    reader: Any, file: Path, output: Path | None, map_file: Path | None, guess: bool, force: bool
+) -> Outcome:
+    from .content import content_of
+
+    if file.is_dir():
+        raise InputError(f"{file} is a folder; name a file in it")
+    content = content_of(reader.load(file))
+    if guess:
+        return _guess(content, file, output)
+    if map_file is None:
+        raise UsageError(
+            f"say which column of {file.name} is which field with --map; "
+            f"'seamlog import {file} --guess -o map.toml' proposes one"
+        )
+    return _import_mapped(content, file, output, map_file, force, None, content.notes)
+
+
+def _guess(content: "Content", file: Path, output: Path | None) -> Outcome:
+    from seamlog.files import write_bytes
+
+    from .guess import guess
+
+    text = guess(content, file)
+    if output is not None:
+        write_bytes(output, text.encode())
+    notes = [f"# {note}" for note in content.notes]
+    head = [f"# written to {output}"] if output else []
+    document = {"file": str(file), "map": text, "notes": content.notes}
+    return Outcome("seamlog.import.guess", "\n".join([text, *notes, *head]), document)
+
+
+def _import_mapped(
+    content: "Content",
+    file: Path,
+    output: Path | None,
+    map_file: Path | None,
+    force: bool,
+    copied: Path | None,
+    notes: list[str],
+) -> Outcome:
+    from seamlog.mcap.batch import BatchWriter
+    from seamlog.mcap.file import McapFile
+
     from .column_map import load_column_map
     from .conversion import convert
 
-    if output is None and not dry_run:
-        raise UsageError("say where to write with -o SESSION.mcap, or look first with --dry-run")
-    if not file.is_file():
-        raise InputError(f"{file}: no such file")
+    assert map_file is not None
+    mapping = load_column_map(map_file, content.columns, content.units)
+    topics, loss = convert(content.columns, mapping, file, content.times)
+    loss.notes = [*notes, *loss.notes]
     if output is not None:
-        check_output(output, force)
-    reader = plugins.load("seamlog.importers", importer or file.suffix.lstrip(".").lower())()
-    columns = reader.load(file)
-    mapping = load_column_map(map_file, columns)
-    topics, loss = convert(columns, mapping, file)
-    if output is not None and not dry_run:
-        _write(output, force, topics, _provenance(file, map_file, mapping))
-    return _outcome(file, None if dry_run else output, topics, loss)
+        facts = _provenance(file) | _provenance(map_file, "map")
+        facts |= {"source": mapping.source} if mapping.source else {}
+        with BatchWriter(output, force) as writer:
+            writer.add_metadata("seamlog.import", facts)
+            if copied is not None:
+                whole = McapFile(copied)
+                writer.copy_file(whole)
+                whole.close()
+            for topic, part in topics.items():
+                writer.write_as(topic, part.channel, part.columns, metadata=part.metadata)
+    return _outcome(file, output, topics, loss)
 
 
-def _write(
-    output: Path, force: bool, topics: Mapping[str, "TopicColumns"], provenance: dict[str, str]
-) -> None:
+def _import_whole(reader: Any, file: Path, output: Path | None, force: bool) -> Outcome:
+    """All messages of a bag, all frames of a video; a dry run writes into a scratch file."""
+    import tempfile
+
     from seamlog.mcap.batch import BatchWriter
 
-    with BatchWriter(output, force) as writer:
-        writer.add_metadata("seamlog.import", provenance)
-        for topic, content in topics.items():
-            writer.write(topic, content.columns, metadata=content.metadata)
+    with tempfile.TemporaryDirectory() as folder:
+        path = output or Path(folder) / "dry.mcap"
+        with BatchWriter(path, force) as writer:
+            notes = reader.write(file, writer)
+            writer.add_metadata("seamlog.import", _provenance(file))
+        return _whole_outcome(file, path, output, notes)
 
 
-def _provenance(file: Path, map_file: Path, mapping: "ColumnMap") -> dict[str, str]:
+@contextmanager
+def _as_session(reader: Any, file: Path) -> "Iterator[tuple[Content, Path, list[str]]]":
+    import tempfile
+
+    from seamlog.mcap.batch import BatchWriter
+    from seamlog.session import open_session
+
+    from .session_columns import content_of_session
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "whole.mcap"
+        with BatchWriter(path) as writer:
+            notes = reader.write(file, writer)
+        with open_session(path) as session:
+            yield content_of_session(session), path, notes
+
+
+def _provenance(file: Path, role: str = "file") -> dict[str, str]:
     from seamlog.results import input_of
 
-    facts = {
-        "file": file.name,
-        "file_sha256": input_of(file).sha256,
-        "map": map_file.name,
-        "map_sha256": input_of(map_file).sha256,
+    facts = {role: file.name}
+    return facts | ({f"{role}_sha256": input_of(file).sha256} if file.is_file() else {})
+
+
+def _whole_outcome(file: Path, path: Path, output: Path | None, notes: list[str]) -> Outcome:
+    from seamlog.session import open_session
+
+    with open_session(path) as session:
+        info = session.info
+        rows = {channel.topic: channel.count for channel in info.channels.values()}
+    head = f"{file} -> {output}" if output else f"{file}: dry run, nothing written"
+    when = f", {info.duration_s:.3f} s from {_date(info.start_ns)}" if info.message_count else ""
+    lines = [head, f"{info.message_count} messages{when}"]
+    lines += [f"  {topic}: {count}" for topic, count in rows.items()]
+    lines += notes or ["nothing was lost"]
+    document = {
+        "file": str(file),
+        "session": str(output) if output else None,
+        "messages": info.message_count,
+        "start_ns": info.start_ns,
+        "duration_s": info.duration_s,
+        "topics": list(rows),
+        "notes": notes,
     }
-    return facts | ({"source": mapping.source} if mapping.source else {})
+    return Outcome("seamlog.import", "\n".join(lines), document)
 
 
 def _outcome(
@@ -94,10 +220,12 @@ def _outcome(
         head,
         f"{loss.rows} rows, {seconds:.3f} s from {_date(first_ns)}, topics {', '.join(topics)}",
     ]
+    lines += [f"{topic}: {timing}" for topic, timing in loss.timing.items()]
     if loss.not_imported:
         lines.append(f"not imported: {', '.join(loss.not_imported)}")
     lines += [f"absent in {topic}: {', '.join(names)}" for topic, names in loss.absent.items()]
     lines += [f"{name}: {count} values missing" for name, count in loss.missing_values.items()]
+    lines += loss.notes
     document: dict[str, Any] = {
         "file": str(file),
         "session": str(output) if output else None,
@@ -108,6 +236,8 @@ def _outcome(
         "not_imported": loss.not_imported,
         "absent": loss.absent,
         "missing_values": loss.missing_values,
+        "timing": {topic: asdict(timing) for topic, timing in loss.timing.items()},
+        "notes": loss.notes,
     }
     return Outcome("seamlog.import", "\n".join(lines), document)
 

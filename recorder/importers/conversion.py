@@ -1,9 +1,11 @@
 """From named columns and a column map to the messages of a session, and what was lost on the way.
 
 Nothing is derived: a field that the map does not fill is NaN (false for flags) and is listed in
-the channel metadata `absent`. Time must increase from row to row.
+the channel metadata `absent`. Time must not go back from row to row; times that repeat, as coarse
+clocks make them, are counted.
 """
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -13,14 +15,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.channels import CHANNELS, STAMP, Channel, Field
+from seamlog.channels import STAMP, Channel, Field
 from seamlog.errors import ImportFailed
 
-from .column_map import ChannelMap, ColumnMap, FieldMap, ScalarColumn, TimeMap, mappable
-from .units import factor_between
+from .column_map import (
+    FREE,
+    ChannelMap,
+    ColumnMap,
+    FieldMap,
+    ScalarColumn,
+    TimeMap,
+    channel_of,
+    mappable,
+)
+from .units import factor_between, spelled
 
 Columns = Mapping[str, NDArray[Any]]
 _NS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0, "min": 60e9}
+_LAST_NS = (1 << 63) - 1
 _EMPTY = {"float64": np.nan, "float32": np.nan}
 
 
@@ -30,6 +42,7 @@ class TopicColumns:
 
     columns: dict[str, NDArray[Any]]
     metadata: dict[str, str]
+    channel: Channel
 
 
 @dataclass
@@ -40,28 +53,77 @@ class Loss:
     not_imported: list[str]
     absent: dict[str, list[str]] = field(default_factory=dict)
     missing_values: dict[str, int] = field(default_factory=dict)
+    timing: dict[str, "Timing"] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
-    @property
-    def any(self) -> bool:
-        """Whether anything of the file, or of the topics, is missing in the session."""
-        return bool(self.not_imported or self.absent or self.missing_values)
+
+@dataclass(frozen=True)
+class Timing:
+    """How even the times of a topic are: its usual period, and where it is not kept.
+
+    `gaps` counts steps above 1.5 periods; `jitter_s` is half the range that 90 % of the other
+    steps lie in.
+    """
+
+    rows: int
+    period_s: float
+    jitter_s: float
+    gaps: int
+    longest_gap_s: float
+    repeated: int
+
+    def __str__(self) -> str:
+        text = f"{self.rows} rows, period {self.period_s * 1e3:.4g} ms"
+        text += f", jitter {self.jitter_s * 1e3:.3g} ms"
+        if self.gaps:
+            text += f", {self.gaps} gaps, the longest {self.longest_gap_s:.4g} s"
+        return text + (f", {self.repeated} times repeated" if self.repeated else "")
+
+
+def timing_of(stamp_ns: NDArray[np.int64]) -> Timing | None:
+    """Evenness of increasing times; None for fewer than three."""
+    steps = np.diff(stamp_ns)
+    real = steps[steps > 0]
+    if len(real) < 2:
+        return None
+    period = float(np.median(real))
+    gaps = real > 1.5 * period
+    usual = real[~gaps]
+    low, high = np.percentile(usual, (5, 95)) if len(usual) else (period, period)
+    return Timing(
+        rows=len(stamp_ns),
+        period_s=period * 1e-9,
+        jitter_s=float(high - low) / 2e9,
+        gaps=int(gaps.sum()),
+        longest_gap_s=float(real.max()) * 1e-9,
+        repeated=int((steps == 0).sum()),
+    )
 
 
 def convert(
-    columns: Columns, mapping: ColumnMap, path: Path
+    columns: Columns, mapping: ColumnMap, path: Path, times: Mapping[str, str] | None = None
 ) -> tuple[dict[str, TopicColumns], Loss]:
     """Topics with their columns, `stamp_ns` among them, and the loss report.
 
-    `path` names the file in errors (`ImportFailed`).
+    `times` names the columns (ns since 1970) that the file states as the times of others; `path`
+    names the file in errors (`ImportFailed`).
     """
-    stamp_ns = _stamps(columns, mapping, path)
     used = _used(mapping)
-    loss = Loss(len(stamp_ns), sorted(name for name in columns if name not in used))
+    stated = set((times or {}).values())
+    loss = Loss(0, sorted(name for name in columns if name not in used | stated))
     topics = {}
     for topic, entry in mapping.channels.items():
-        channel = CHANNELS[topic]
+        channel = channel_of(topic, entry)
+        stamp_ns = _stamps(columns, _time_of(topic, entry, mapping, times or {}, path), entry, path)
+        loss.rows = max(loss.rows, len(stamp_ns))
+        timing = timing_of(stamp_ns)
+        if timing:
+            loss.timing[topic] = timing
         values = _fields(columns, channel, entry, stamp_ns, path)
         metadata = {key: _text(columns, key, value, path) for key, value in entry.metadata.items()}
+        if topic.startswith(FREE):
+            units = {field.name: field.unit for field in channel.fields[1:] if field.unit}
+            metadata = {"units": json.dumps(units, sort_keys=True)} | metadata
         absent = [name for name in mappable(channel) if name not in entry.fields]
         if absent:
             loss.absent[topic] = absent
@@ -70,7 +132,10 @@ def convert(
             missing = int(np.isnan(values[name].astype(np.float64)).sum())
             if missing:
                 loss.missing_values[f"{topic} {name}"] = missing
-        topics[topic] = TopicColumns(values, metadata)
+            digits = _rounded(values[name])
+            if digits:
+                loss.notes.append(f"{topic} {name} has {digits} significant digits")
+        topics[topic] = TopicColumns(values, metadata, channel)
     return topics, loss
 
 
@@ -78,18 +143,57 @@ def _used(mapping: ColumnMap) -> set[str | None]:
     fields = [item for entry in mapping.channels.values() for item in entry.fields.values()]
     metadata = [value for entry in mapping.channels.values() for value in entry.metadata.values()]
     scalars = [value.column for value in metadata if isinstance(value, ScalarColumn)]
-    return {mapping.time.column, *(item.column for item in fields), *scalars}
+    maps = [mapping.time, *(entry.time for entry in mapping.channels.values())]
+    times = [time.column for time in maps if time]
+    return {*times, *(item.column for item in fields), *scalars}
 
 
-def _stamps(columns: Columns, mapping: ColumnMap, path: Path) -> NDArray[np.int64]:
-    time = mapping.time
+def _rounded(values: NDArray[Any]) -> int | None:
+    """Significant digits of values that are rounded to four or fewer; None for others."""
+    found = (
+        np.unique(values[np.isfinite(values) & (values != 0)]) if values.ndim == 1 else values[:0]
+    )
+    if len(found) < 50:
+        return None
+    scale = 10.0 ** np.floor(np.log10(np.abs(found)))
+    for digits in (2, 3, 4):
+        step = 10.0 ** (digits - 1)
+        if np.allclose(np.rint(found / scale * step) / step * scale, found, rtol=1e-9, atol=0):
+            return digits
+    return None
+
+
+def _time_of(
+    topic: str, entry: ChannelMap, mapping: ColumnMap, times: Mapping[str, str], path: Path
+) -> TimeMap:
+    given = entry.time or mapping.time
+    if given is not None:
+        return given
+    named = [item.column for item in entry.fields.values() if item.column]
+    stated = {times[name] for name in named if name in times}
+    if len(stated) == 1:
+        return TimeMap(column=stated.pop(), unit="ns")
+    if stated:
+        raise ImportFailed(
+            f"{path}: the columns of {topic} have different times ({', '.join(sorted(stated))}); "
+            "map them to topics of their own, or give time.column"
+        )
+    raise ImportFailed(
+        f"{path}: nothing says when the rows of {topic} were: the file has no time for them; give "
+        "[time] with column, or with rate_hz and start"
+    )
+
+
+def _stamps(columns: Columns, time: TimeMap, entry: ChannelMap, path: Path) -> NDArray[np.int64]:
     since = time.start - datetime(1970, 1, 1, tzinfo=UTC)
     start_ns = (since.days * 86400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
     if time.column is None:
-        return start_ns + _even_ns(time, _row_count(columns, mapping, path))
+        return start_ns + _even_ns(time, _row_count(columns, entry, path))
     values = np.asarray(columns[time.column])
     if values.ndim != 1 or not len(values):
         raise ImportFailed(f"{path}: time column {time.column!r} is no column but a single number")
+    if values.dtype.kind not in "iuf":
+        raise ImportFailed(f"{path}: time column {time.column!r} holds no numbers")
     seconds = values.astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(seconds))
     if len(bad):
@@ -97,13 +201,23 @@ def _stamps(columns: Columns, mapping: ColumnMap, path: Path) -> NDArray[np.int6
             f"{path}: time column {time.column!r} has no value in row {bad[0] + 1}; "
             "remove such rows or map time by rate_hz"
         )
-    stamp_ns = start_ns + np.rint(seconds * _NS[time.unit]).astype(np.int64)
+    if np.abs(seconds).max() * _NS[time.unit] + start_ns > _LAST_NS:
+        raise ImportFailed(
+            f"{path}: time column {time.column!r} reaches {np.abs(seconds).max():g} {time.unit}, "
+            "which is no time between 1970 and 2262; check its unit"
+        )
+    exact = values.dtype.kind in "iu"
+    scaled = values * int(_NS[time.unit]) if exact else np.rint(seconds * _NS[time.unit])
+    stamp_ns = start_ns + scaled.astype(np.int64)
     _require_increasing(stamp_ns, time.column, path)
     return stamp_ns
 
 
 def _require_increasing(stamp_ns: NDArray[np.int64], column: str, path: Path) -> None:
-    back = np.flatnonzero(np.diff(stamp_ns) <= 0)
+    steps = np.diff(stamp_ns)
+    back = np.flatnonzero(steps < 0)
+    if not len(back) and (steps == 0).sum() * 2 > len(steps):
+        back = np.flatnonzero(steps == 0)
     if len(back):
         row = int(back[0]) + 2
         raise ImportFailed(
@@ -111,6 +225,8 @@ def _require_increasing(stamp_ns: NDArray[np.int64], column: str, path: Path) ->
             f"({len(back)} such row{'s' if len(back) > 1 else ''}); sort or clean the file, "
             "or map time by rate_hz"
         )
+    if int(stamp_ns[0]) < 0:
+        raise ImportFailed(f"{path}: time column {column!r} begins before 1970; give time.start")
 
 
 def _even_ns(time: TimeMap, rows: int) -> NDArray[np.int64]:
@@ -119,11 +235,10 @@ def _even_ns(time: TimeMap, rows: int) -> NDArray[np.int64]:
     return stamp_ns
 
 
-def _row_count(columns: Columns, mapping: ColumnMap, path: Path) -> int:
-    for entry in mapping.channels.values():
-        for item in entry.fields.values():
-            if item.column is not None and columns[item.column].ndim == 1:
-                return len(columns[item.column])
+def _row_count(columns: Columns, entry: ChannelMap, path: Path) -> int:
+    for item in entry.fields.values():
+        if item.column is not None and columns[item.column].ndim == 1:
+            return len(columns[item.column])
     raise ImportFailed(f"{path}: the map names no column with rows, only constants")
 
 
@@ -166,13 +281,18 @@ def _values(
         raw = np.full(rows, mapped.constant)
     else:
         assert mapped.column is not None
-        raw = np.asarray(columns[mapped.column], dtype=np.float64)
+        found = np.asarray(columns[mapped.column])
+        if found.dtype.kind not in "iufb":
+            raise ImportFailed(f"{path}: column {mapped.column!r} holds no numbers")
+        raw = found.astype(np.float64)
     if raw.shape != (rows,):
         raise ImportFailed(
             f"{path}: column {mapped.column!r} has {raw.size} values, time has {rows}; "
             "map columns of one length into one session"
         )
-    factor = 1.0 if mapped.unit is None else factor_between(mapped.unit, item.unit)
+    factor = 1.0 if mapped.unit is None else factor_between(spelled(mapped.unit), item.unit)
+    if factor is None and item.unit == mapped.unit:
+        factor = 1.0
     assert factor is not None
     return (raw * mapped.scale + mapped.offset) * factor
 

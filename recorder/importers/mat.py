@@ -1,4 +1,4 @@
-"""MATLAB files up to version 7.2."""
+"""MATLAB files: up to version 7.2 through SciPy, version 7.3 (HDF5) through pymatreader."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.errors import ImportFailed
+from seamlog.errors import HardwareError, ImportFailed
+
+from .content import Content
+
+_HDF5 = b"MATLAB 7.3"
 
 
 class MatImporter:
@@ -17,37 +21,67 @@ class MatImporter:
     What holds no numbers is left out.
     """
 
-    def load(self, path: Path) -> Mapping[str, NDArray[Any]]:
+    def load(self, path: Path) -> Content:
         """All numeric columns; `ImportFailed` if the file is no MATLAB file this can read."""
-        import scipy.io
-
+        with path.open("rb") as file:
+            is_hdf5 = file.read(len(_HDF5)) == _HDF5
         try:
-            content = scipy.io.loadmat(str(path), squeeze_me=False, struct_as_record=True)
-        except NotImplementedError as error:
-            raise ImportFailed(
-                f"{path} is a MATLAB 7.3 file (HDF5), which is not read; save it in MATLAB with "
-                "save('name.mat', '-v7')"
-            ) from error
-        except FileNotFoundError:
+            content = _read_hdf5(path) if is_hdf5 else _read(path)
+        except (FileNotFoundError, ImportFailed, HardwareError):
             raise
         except Exception as error:
             raise ImportFailed(f"{path} cannot be read as a MATLAB file: {error}") from error
+        found = Content({}, notes=[])
         columns: dict[str, NDArray[Any]] = {}
         for name, value in content.items():
-            if not name.startswith("__"):
-                columns.update(_columns(name, value))
-        return columns
+            if not name.startswith(("__", "#")):
+                columns.update(_columns(name, value, found.notes))
+        if not columns:
+            raise ImportFailed(f"{path} holds no numbers")
+        found.columns = columns
+        return found
 
 
-def _columns(name: str, value: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    if not isinstance(value, np.ndarray) or value.size == 0:
+def _read(path: Path) -> Mapping[str, Any]:
+    import scipy.io
+
+    found: Mapping[str, Any] = scipy.io.loadmat(str(path), squeeze_me=False, struct_as_record=True)
+    return found
+
+
+def _read_hdf5(path: Path) -> Mapping[str, Any]:
+    try:
+        from pymatreader import read_mat
+    except ImportError as error:
+        raise HardwareError(
+            f"{path}: MATLAB 7.3 files are read by pymatreader: pip install 'seamlog[import]'"
+        ) from error
+    found: Mapping[str, Any] = read_mat(str(path))
+    return found
+
+
+def _columns(name: str, value: Any, notes: list[str]) -> Iterator[tuple[str, NDArray[Any]]]:
+    if isinstance(value, Mapping):
+        for field, inner in value.items():
+            yield from _columns(f"{name}.{field}", inner, notes)
         return
-    if value.dtype.names and value.size == 1:
+    if isinstance(value, bool | int | float):
+        value = np.asarray(value)
+    if not isinstance(value, np.ndarray):
+        notes.append(f"variable {name} holds {type(value).__name__}, no numbers, and was left out")
+    elif value.size == 0:
+        notes.append(f"variable {name} is empty")
+    elif value.dtype.names and value.size == 1:
         record = value.reshape(-1)[0]
         for field in value.dtype.names:
-            yield from _columns(f"{name}.{field}", record[field])
+            yield from _columns(f"{name}.{field}", record[field], notes)
+    elif value.dtype == object and value.size == 1:
+        yield from _columns(name, value.reshape(-1)[0], notes)
     elif value.dtype.kind in "biuf" and value.ndim <= 2:
         yield from _numeric(name, value)
+    else:
+        what = f"{value.dtype} of shape {value.shape}"
+        notes.append(f"variable {name} holds {what} and was left out")
 
 
 def _numeric(name: str, value: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -21,6 +21,44 @@ _SI: dict[str, tuple[str, float]] = {
 }
 
 
+_SPELLINGS = {
+    "in": "inch",
+    "µm": "um",
+    "μm": "um",
+    "m/s²": "m/s^2",
+    "mm/s²": "mm/s^2",
+    "m/s2": "m/s^2",
+    "mm/s2": "mm/s^2",
+    "in/min": "inch/min",
+    "ipm": "inch/min",
+    "amps": "A",
+    "ampere": "A",
+    "volt": "V",
+    "volts": "V",
+    "meter": "m",
+    "meters": "m",
+    "millimeter": "mm",
+    "sec": "s",
+    "seconds": "s",
+    "msec": "ms",
+}
+_TIMES = ("s", "ms", "us", "ns", "min")
+
+
+def spelled(unit: str) -> str:
+    """The unit as it is written here."""
+    bare = unit.strip()
+    return _SPELLINGS.get(bare, _SPELLINGS.get(bare.lower(), bare))
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that is known here, or looks like one of time, force or angle."""
+    found = spelled(text)
+    return (
+        found in _SI or found in _TIMES or found in ("N", "Nm", "kN", "Hz", "rad", "deg", "%", "°C")
+    )
+
+
 def factor_between(unit: str, wanted: str) -> float | None:
     """Multiply a value in `unit` by this to have it in `wanted`; None if that is not known.
 

@@ -16,7 +16,10 @@ from seamlog.errors import UnknownName, UsageError
 from seamlog.files import replacing
 from seamlog.mcap.compression import COMPRESSIONS, NONE
 from seamlog.mcap.copying import copy_file
+from seamlog.mcap.file import McapFile
 from seamlog.mcap.packing import RecordTemplate, payload_records
+from seamlog.mcap.records import Schema
+from seamlog.mcap.streams import MessageStream
 from seamlog.mcap.writer import FileWriter
 from seamlog.messages import definition
 from seamlog.segments import PROBLEMS, RECORDING
@@ -30,7 +33,7 @@ _CHUNK_BYTES = 1 << 20
 class BatchWriter:
     """Writes a session to `path`, whole or not at all; use it as a context manager.
 
-    Chunks of about 1 MiB, one channel each; pictures are stored uncompressed. `OutputExists` if
+    Chunks of 1 MiB and more, one channel each; pictures are stored uncompressed. `OutputExists` if
     the file is there and `force` is not set.
     """
 
@@ -42,6 +45,7 @@ class BatchWriter:
         self._channels: dict[tuple[Any, ...], int] = {}
         self._sequences: dict[int, int] = {}
         self._metadata: set[str] = set()
+        self._streams: list[MessageStream] = []
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -61,6 +65,8 @@ class BatchWriter:
             self._stack.__exit__(kind, error, trace)
             return
         with self._stack:
+            for stream in self._streams:
+                stream.flush()
             if RECORDING not in self._metadata:
                 self.add_metadata(RECORDING, {"id": uuid.uuid4().hex, "index": "1"})
             self._writer.finish()
@@ -94,7 +100,7 @@ class BatchWriter:
         template = RecordTemplate(channel, number)
         ready = template.checked(topic, columns)
         times = _log_times(topic, log_times_ns, ready["stamp_ns"])
-        rows = max(1, _CHUNK_BYTES // template.stride)
+        rows = -(-_CHUNK_BYTES // template.stride)
         first = self._sequence(number, len(times))
         for start in range(0, len(times), rows):
             part = slice(start, start + rows)
@@ -125,6 +131,22 @@ class BatchWriter:
             self._writer.write_chunk(
                 number, data, chunk_times, offsets, compression, standalone=False
             )
+
+    def stream(
+        self,
+        topic: str,
+        schema: Schema | None,
+        message_encoding: str = "cdr",
+        metadata: Mapping[str, str] | None = None,
+    ) -> MessageStream:
+        """A channel of any messages, which come one by one; they are written as they are."""
+        number = 0
+        if schema is not None:
+            number = self._writer.schema_id(schema.name, schema.data, schema.encoding)
+        channel = self._writer.add_channel(topic, number, metadata or {}, message_encoding)
+        name = schema.name if schema else ""
+        self._streams.append(MessageStream(self._writer, channel, name, self._compression))
+        return self._streams[-1]
 
     def channel(
         self, topic: str, channel: Channel, metadata: Mapping[str, str] | None = None
@@ -157,6 +179,10 @@ class BatchWriter:
         """Put a metadata record into the session."""
         self._metadata.add(name)
         self._writer.add_metadata(name, mapping)
+
+    def copy_file(self, file: McapFile) -> None:
+        """Copy channels, chunks and attachments of one file; its metadata stays behind."""
+        copy_file(file, self._writer)
 
     def copy_session(
         self, session: "Session", leave_out: Collection[str] = (), same_recording: bool = False

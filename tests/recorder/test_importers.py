@@ -84,7 +84,7 @@ def test_all_faults_of_a_map_come_at_once(files: Files) -> None:
     text = MAP.replace("pos", "poss").replace("/table/command", "/table/comand")
     log, mapping = files(text.replace("[time]", "[time]\nrates = 3"))
     with pytest.raises(ConfigError) as caught:
-        load_column_map(mapping, MatImporter().load(log))
+        load_column_map(mapping, MatImporter().load(log).columns)
     assert len(caught.value.faults) == 4
     message = str(caught.value)
     assert "time.rates" in message
@@ -110,13 +110,13 @@ def test_a_fault_of_a_map_says_where_and_what(
     assert old in MAP
     log, mapping = files(MAP.replace(old, new))
     with pytest.raises(ConfigError, match=message):
-        load_column_map(mapping, MatImporter().load(log))
+        load_column_map(mapping, MatImporter().load(log).columns)
 
 
 @pytest.mark.parametrize(
     ("times", "message"),
     [
-        ([0.0, 0.1, 0.1, 0.2, 0.3], "row 3"),
+        ([0.0, 0.1, 0.1, 0.1, 0.1], "row 3"),
         ([0.0, 0.1, 0.2, 0.15, 0.3], "row 4"),
         ([0.0, np.nan, 0.2, 0.3, 0.4], "no value in row 2"),
     ],
@@ -162,11 +162,22 @@ def test_an_unknown_suffix_lists_the_importers(
     assert "csv, mat" in capsys.readouterr().err
 
 
-def test_a_matlab_73_file_says_what_to_do(tmp_path: Path) -> None:
+def test_a_cut_matlab_73_file_is_refused(tmp_path: Path) -> None:
     head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
     (tmp_path / "new.mat").write_bytes(head.ljust(512, b"\0") + b"\x89HDF\r\n\x1a\n" + b"\0" * 600)
-    with pytest.raises(ImportFailed, match="-v7"):
+    with pytest.raises(ImportFailed, match=r"new\.mat cannot be read"):
         MatImporter().load(tmp_path / "new.mat")
+
+
+def test_times_that_repeat_and_gaps_are_counted(
+    files: Files, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, mapping = files(t=np.array([0.0, 0.1, 0.1, 0.2, 0.9])[:, None])
+    assert run_import(log, mapping, "--dry-run", "--json") == 0
+    timing = json.loads(capsys.readouterr().out)["timing"]["/table/encoder"]
+    assert timing["repeated"] == 1
+    assert timing["gaps"] == 1
+    assert timing["longest_gap_s"] == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize("content", [b"", b"no matlab file at all" * 20, b"\0" * 200])
@@ -178,7 +189,7 @@ def test_a_foreign_file_is_refused(tmp_path: Path, content: bytes) -> None:
 
 def test_structures_and_matrices_become_columns(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "s.mat", {"run": {"v": [1.0, 2.0]}, "m": np.eye(3), "name": "x"})
-    columns = MatImporter().load(tmp_path / "s.mat")
+    columns = MatImporter().load(tmp_path / "s.mat").columns
     assert set(columns) == {"run.v", "m[0]", "m[1]", "m[2]"}
     assert columns["run.v"].tolist() == [1.0, 2.0]
 
@@ -187,14 +198,14 @@ def test_structures_and_matrices_become_columns(tmp_path: Path) -> None:
 def test_csv_columns_are_named_by_the_header(tmp_path: Path, separator: str) -> None:
     rows = ["t, x ,word", "0,1,a", "1,,b"]
     (tmp_path / "t.csv").write_text("\n".join(rows).replace(",", separator) + "\n")
-    columns = CsvImporter().load(tmp_path / "t.csv")
+    columns = CsvImporter().load(tmp_path / "t.csv").columns
     assert set(columns) == {"t", "x"}
     np.testing.assert_array_equal(columns["x"], [1.0, np.nan])
 
 
 def test_a_csv_without_header_numbers_its_columns(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("0.0, 5, 6\n0.1, 7, 8\n")
-    columns = CsvImporter().load(tmp_path / "t.csv")
+    columns = CsvImporter().load(tmp_path / "t.csv").columns
     assert {name: list(column) for name, column in columns.items()} == {
         "column 1": [0.0, 0.1],
         "column 2": [5, 7],

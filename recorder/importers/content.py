@@ -1,0 +1,26 @@
+"""What an importer reads out of a foreign file, before a column map is applied."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from numpy.typing import NDArray
+
+
+@dataclass
+class Content:
+    """Columns (or scalars of shape ()) by their names in the file, and what the file says of them.
+
+    `units` holds units that the file states, `times` the column that holds the time of another,
+    `notes` what was left out or had to be decided while reading.
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    units: dict[str, str] = field(default_factory=dict)
+    times: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def content_of(loaded: Any) -> Content:
+    """What `load` gave: a `Content`, or columns alone."""
+    return loaded if isinstance(loaded, Content) else Content(loaded)
