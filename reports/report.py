@@ -7,7 +7,6 @@ report.add_curves("Gas flow", seconds, {"flow": flow}, unit="l/min", limits={"le
 report.write(Path("report.html"))
 """
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from seamlog import __version__, plugins
 from seamlog.errors import UsageError
 from seamlog.files import write_bytes
-from seamlog.results import Figure, Results, Verdict
+from seamlog.results import Figure, Results, Verdict, report_id
 
 from .content import AnyBlock, FigureTable, Section, Text
 from .document import Document
@@ -112,7 +111,7 @@ class Report:
         return Document(
             title=self._title or f"Weld report: {self._named() or subject}",
             subject=subject,
-            id=self._id(),
+            id=report_id(run.fingerprint for run in self.runs),
             date=self._date or self._end(),
             verdict=self._verdict or overall(self.runs).verdict,
             seamlog_version=__version__,
@@ -131,10 +130,6 @@ class Report:
         """What the sessions call their parts; '' unless each of them does."""
         names = [run.part_name for run in self.runs]
         return ", ".join(dict.fromkeys(name for name in names if name)) if all(names) else ""
-
-    def _id(self) -> str:
-        digest = hashlib.sha256(b"".join(run.fingerprint for run in self.runs))
-        return digest.hexdigest()[:16]
 
     def _end(self) -> str | None:
         ends = [end for run in self.runs if (end := run.end_ns()) is not None]

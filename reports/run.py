@@ -4,13 +4,11 @@ import hashlib
 import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.errors import ResultsError
 from seamlog.results import Finding, Part, Place, Results
 
 from .content import FindingLine, PlaceLink
@@ -39,7 +37,7 @@ class Run:
         self.results = results
         self.index = index
         self.parts = results.parts()
-        self.fingerprint = self._read()
+        self.fingerprint = results.fingerprint()
         self._columns: dict[tuple[str, str], dict[str, NDArray[Any]]] = {}
         self.label = self._label()
         self.origin_ns = self._origin_ns()
@@ -119,22 +117,6 @@ class Run:
             FindingLine(severity=f.severity, message=f.message, place=self.place(part, f.place))
             for f in findings
         ]
-
-    def _read(self) -> bytes:
-        """SHA-256 over all parts; refuses files that were changed after the analysis."""
-        digest = hashlib.sha256()
-        for part in self.parts:
-            digest.update(part.model_dump_json().encode())
-            for table in part.tables.values():
-                self._check(table.file, table.sha256)
-            for picture in part.pictures.values():
-                self._check(picture.file, picture.sha256)
-        return digest.digest()
-
-    def _check(self, file: str, sha256: str) -> None:
-        path = self.results.folder / Path(file).name
-        if hashlib.sha256(path.read_bytes()).hexdigest() != sha256:
-            raise ResultsError(f"{path} was changed after the analysis; run analyze again")
 
     def _label(self) -> str:
         names = [entry.name for part in self.parts for entry in part.inputs]

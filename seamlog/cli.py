@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 
 import click
 
+from seamlog.called import calling
 from seamlog.command import Group
 from seamlog.errors import (
     EvidenceError,
@@ -40,6 +41,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "analyze": ("seamlog.analysis.commands.analyze:analyze", "Session and photos to results."),
     "report": ("seamlog.reports.commands:report", "Results to one HTML file."),
     "compare": ("seamlog.reports.compare_command:compare", "Results beside each other."),
+    "verify": ("seamlog.commands.verify:verify", "Recompute a report's figures from its inputs."),
     "demo": ("seamlog.commands.demo:demo", "A virtual weld through the whole chain."),
     "plugins": ("seamlog.commands.plugins:plugins", "List what is pluggable."),
     "env": ("seamlog.commands.env:env", "Versions, for a bug report."),
@@ -144,7 +146,7 @@ def invoke(arguments: list[str]) -> object:
 
     For commands that chain others (`demo`): they reach them by name, as a person would.
     """
-    with seamlog.make_context("seamlog", arguments or ["--help"]) as context:
+    with calling(arguments), seamlog.make_context("seamlog", arguments or ["--help"]) as context:
         return seamlog.invoke(context)
 
 

@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from seamlog.called import call_to
 from seamlog.errors import ResultsError
 from seamlog.files import replacing, write_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -137,6 +138,8 @@ class Part(_Model):
     weld: int | None = None
     seamlog_version: str = ""
     inputs: list[Input] = []
+    command: list[str] = []
+    """The call that made it, as `seamlog.called` writes it down; empty outside of a command."""
     configuration: dict[str, Any] = {}
     verdict: Verdict = Verdict.NOT_ASSESSED
     reason: str = ""
@@ -226,7 +229,12 @@ class Results:
             digest = hashlib.sha256(data).hexdigest()
             images[name] = picture.model_copy(update={"file": file, "sha256": digest})
         whole = part.model_copy(
-            update={"tables": written, "pictures": images, "seamlog_version": __version__}
+            update={
+                "tables": written,
+                "pictures": images,
+                "seamlog_version": __version__,
+                "command": part.command or call_to(self.folder),
+            }
         )
         text = whole.model_dump_json(indent=1) + "\n"
         write_bytes(self.folder / f"{part.stem}.json", text.encode())
@@ -272,12 +280,30 @@ class Results:
         """The bytes of a picture of `part`."""
         return self._member(part.pictures[name].file).read_bytes()
 
+    def fingerprint(self) -> bytes:
+        """SHA-256 over all parts; `ResultsError` for files that were changed after the analysis."""
+        digest = hashlib.sha256()
+        for part in self.parts():
+            digest.update(part.model_dump_json().encode())
+            files = [(table.file, table.sha256) for table in part.tables.values()]
+            files += [(picture.file, picture.sha256) for picture in part.pictures.values()]
+            for name, sha256 in files:
+                path = self._member(name)
+                if hashlib.sha256(path.read_bytes()).hexdigest() != sha256:
+                    raise ResultsError(f"{path} was changed after the analysis; run analyze again")
+        return digest.digest()
+
     def _member(self, name: str) -> Path:
         if Path(name).name != name:
             raise ResultsError(
                 f"{self.folder}: {name!r} is no plain file name; refuse to follow it"
             )
         return self.folder / name
+
+
+def report_id(fingerprints: "Iterable[bytes]") -> str:
+    """Id of a report on results with these fingerprints, in their order."""
+    return hashlib.sha256(b"".join(fingerprints)).hexdigest()[:16]
 
 
 def part_schema() -> dict[str, Any]:

@@ -14,6 +14,7 @@ RUN = "import sys; from seamlog.cli import run; code = run(sys.argv[1:]); "
 ALLOWED_OUTSIDE = {"click", "seamlog"}
 ALLOWED_INSIDE = {
     "seamlog",
+    "seamlog.called",
     "seamlog.cli",
     "seamlog.command",
     "seamlog.errors",
