@@ -10,7 +10,9 @@ from seamlog.results import Input, Part, input_of
 from .bead.assess import AssessedPhoto, assess_photos
 from .bead.part import BeadConfig, Pictures, Tables
 from .bead.sources import attached_photos, photo_files
+from .inspection import InspectionSettings, inspect_photos
 from .join_part import join_part, no_join
+from .quality.part import QualityConfig
 
 if TYPE_CHECKING:
     from seamlog.session import Session
@@ -25,19 +27,20 @@ def bead_and_join(
     config: Path | None = None,
     settings: tuple[str, ...] = (),
 ) -> list[tuple[Part, Tables, Pictures]]:
-    """Parts `bead` of each photo and `join` of each weld; none without photos.
+    """Parts `bead`, `surface`, `quality` of each photo, `join` of each weld; none without photos.
 
     Without `photos` those attached to the session are taken. With as many photos as welds each
     belongs to the weld of its number; else all of them to the only weld.
     """
     settled = load_config(BeadConfig, "bead", config, settings)
+    quality = load_config(QualityConfig, "quality", config, settings)
     sources = photo_files(photos, None) if photos else attached_photos(session)
     if not sources:
         return []
     only = welds[0].number if len(welds) == 1 else None
     assessed = assess_photos(sources, start, settled, only)
     inputs = [input_of(path) for path in session.paths]
-    parts = [(item.part, item.tables, item.pictures) for item in assessed]
+    parts = inspect_photos(assessed, InspectionSettings(quality))
     if not welds:
         return [*parts, (no_join("the session has no weld", None, inputs), {}, {})]
     for index, weld in enumerate(welds):

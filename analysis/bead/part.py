@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from seamlog.analysis.quality.judge import judge
+from seamlog.analysis.quality.stations import doubt, station_criterion
 from seamlog.calibration import Calibration
 from seamlog.plugins import load
 from seamlog.results import (
@@ -25,7 +27,7 @@ from seamlog.results import (
 from .image import Photo
 from .measurement import END, BeadDetector, BeadMeasurement
 from .overlay import overlay_webp
-from .plane import plane_of
+from .plane import Plane, plane_of
 from .uniformity import Uniformity, uniformity
 
 Tables = Mapping[str, tuple[Columns, Mapping[str, str]]]
@@ -50,6 +52,7 @@ class BeadResult:
     photo: Photo
     measurement: BeadMeasurement
     uniformity: Uniformity | None
+    plane: Plane | None = None
 
 
 def measure_photo(
@@ -65,8 +68,9 @@ def measure_photo(
     """
     config = config or BeadConfig()
     detector: BeadDetector = load("seamlog.bead_detectors", config.detector)
-    measurement = detector(photo, plane_of(photo, calibration), start=start)
-    return BeadResult(photo, measurement, uniformity(measurement))
+    plane = plane_of(photo, calibration)
+    measurement = detector(photo, plane, start=start)
+    return BeadResult(photo, measurement, uniformity(measurement), plane)
 
 
 def bead_part(
@@ -166,54 +170,21 @@ def _figures(result: BeadResult) -> list[Figure]:
 def _criteria(result: BeadResult, config: BeadConfig) -> list[Criterion]:
     criteria = []
     if config.min_width_mm is not None or config.max_width_mm is not None:
-        criteria.append(_width_criterion(result, config))
+        limits = (config.min_width_mm, config.max_width_mm)
+        criteria.append(station_criterion(result.measurement, *limits))
     if config.max_width_cv is not None:
-        even = result.uniformity
+        even, m = result.uniformity, result.measurement
         value = even.cv if even else None
-        verdict = _judged(result, value is not None and value <= config.max_width_cv)
+        verdict, reason = judge(value, None, None, config.max_width_cv)
+        if not m.trusted:
+            verdict, reason = Verdict.NOT_MEASURABLE, doubt(m)
         criteria.append(
             Criterion(
                 name="width_cv", label="Evenness of the width", value=value, unit="1",
-                upper=config.max_width_cv, verdict=verdict,
-                reason="" if verdict in (Verdict.PASS, Verdict.FAIL) else _doubt(result),
+                upper=config.max_width_cv, verdict=verdict, reason=reason,
             )
         )  # fmt: skip
     return criteria
-
-
-def _width_criterion(result: BeadResult, config: BeadConfig) -> Criterion:
-    """The worst station against the limits; PASS only with value + 2 u inside."""
-    m = result.measurement
-    low = -np.inf if config.min_width_mm is None else config.min_width_mm
-    high = np.inf if config.max_width_mm is None else config.max_width_mm
-    limits = {"lower": config.min_width_mm, "upper": config.max_width_mm, "unit": "mm"}
-    label = "Width at every station"
-    if m.unit != "mm" or result.uniformity is None:
-        reason = "no calibration" if m.unit != "mm" else "no station could be measured"
-        return Criterion(
-            name="width_mm", label=label, value=None, verdict=Verdict.NOT_MEASURABLE,
-            reason=reason, **limits,
-        )  # fmt: skip
-    good = np.flatnonzero(m.good)
-    room = np.minimum(m.width[good] - low, high - m.width[good]) - 2 * m.u_width[good]
-    at = good[int(np.argmin(room))]
-    inside = bool(room.min() >= 0)
-    verdict = _judged(result, inside)
-    return Criterion(
-        name="width_mm", label=label, value=float(m.width[at]), u=float(m.u_width[at]),
-        verdict=verdict, place=Place(s_mm=float(m.s[at])),
-        reason="" if verdict in (Verdict.PASS, Verdict.FAIL) else _doubt(result), **limits,
-    )  # fmt: skip
-
-
-def _judged(result: BeadResult, holds: bool) -> Verdict:
-    if result.uniformity is None or not result.measurement.trusted:
-        return Verdict.NOT_MEASURABLE
-    return Verdict.PASS if holds else Verdict.FAIL
-
-
-def _doubt(result: BeadResult) -> str:
-    return f"confidence {result.measurement.confidence:.2f} is too low to judge"
 
 
 def _reason(criteria: list[Criterion]) -> str:

@@ -11,6 +11,8 @@ from seamlog.outcome import Ending, Outcome
 
 if TYPE_CHECKING:
     from seamlog.analysis.bead.assess import AssessedPhoto
+    from seamlog.analysis.inspection import Inspected
+    from seamlog.results import Columns
 
 
 @group("bead")
@@ -36,6 +38,9 @@ def bead() -> None:
     type=click.Choice(["left", "right", "top", "bottom"]),
     help="Side of the photo at which the weld began.",
 )
+@click.option(
+    "--before", type=click.Path(path_type=Path), help="Photo of the plate from before welding."
+)
 @output_option("Results directory.", required=False)
 @config_options
 @force_option
@@ -45,29 +50,36 @@ def measure(
     weld: int | None,
     calibration: Path | None,
     start: str | None,
+    before: Path | None,
     output: Path | None,
     config: Path | None,
     settings: tuple[str, ...],
     force: bool,
 ) -> Outcome:
-    """Measure width and evenness of the bead on PHOTOs, in mm with a calibration, else in px.
+    """Measure width and surface of the bead on PHOTOs, in mm with a calibration, else in px.
 
-    Refuses (exit code 6) a photo in which no bead can be told from the plate; the results, if
-    asked for, then say why.
+    Limits come from the sections [bead] and [quality] of the configuration. Refuses (exit code 6)
+    a photo in which no bead can be told from the plate; the results, if asked for, then say why.
     """
     from seamlog.analysis.bead.assess import assess_photos
+    from seamlog.analysis.bead.image import load_photo
     from seamlog.analysis.bead.part import BeadConfig
+    from seamlog.analysis.inspection import InspectionSettings, inspect_photos
+    from seamlog.analysis.quality.part import QualityConfig
     from seamlog.config import load_config
 
     _check_output(output, force)
     settled = load_config(BeadConfig, "bead", config, settings)
+    quality = load_config(QualityConfig, "quality", config, settings)
+    earlier = load_photo(before) if before else None
     sources = _sources(photos, session, calibration)
     assessed = assess_photos(sources, start, settled, weld)
+    parts = inspect_photos(assessed, InspectionSettings(quality, earlier))
     if output is not None:
-        _write(output, assessed)
+        _write(output, parts)
     if len(assessed) == 1 and assessed[0].refusal is not None:
         raise assessed[0].refusal
-    return _outcome(assessed, output)
+    return _outcome(assessed, parts, output)
 
 
 bead.add_command(measure)
@@ -95,18 +107,32 @@ def _sources(photos: tuple[Path, ...], session: Path | None, calibration: Path |
     return found
 
 
-def _write(output: Path, assessed: list["AssessedPhoto"]) -> None:
+def _write(output: Path, parts: list["Inspected"]) -> None:
+    """All parts, and the widths as CSV beside their Parquet table."""
     from seamlog.results import Results
 
     results = Results.create(output)
-    for path in output.glob("bead*.json"):
-        path.unlink()
-    for item in assessed:
-        results.write(item.part, item.tables, item.pictures)
+    for kind in ("bead", "surface", "quality"):
+        for path in output.glob(f"{kind}*.json"):
+            path.unlink()
+    for part, tables, pictures in parts:
+        written = results.write(part, tables, pictures)
+        if part.part == "bead" and "stations" in tables:
+            _write_csv(output / f"{written.stem}.stations.csv", tables["stations"][0])
 
 
-def _outcome(assessed: list["AssessedPhoto"], output: Path | None) -> Outcome:
-    documents = [item.summary() for item in assessed]
+def _write_csv(path: Path, columns: "Columns") -> None:
+    import pandas as pd
+
+    from seamlog.files import write_bytes
+
+    write_bytes(path, pd.DataFrame(dict(columns)).to_csv(index=False).encode())
+
+
+def _outcome(
+    assessed: list["AssessedPhoto"], parts: list["Inspected"], output: Path | None
+) -> Outcome:
+    documents = [_document(item, parts) for item in assessed]
     lines = [line for document in documents for line in _lines(document)]
     if output is not None:
         lines.append(f"Results: {output}")
@@ -115,6 +141,25 @@ def _outcome(assessed: list["AssessedPhoto"], output: Path | None) -> Outcome:
     ending = Ending.FINDING if failed else Ending.BATCH_FAILED if refused else Ending.PASS
     document = {"photos": documents, "results": str(output) if output else None}
     return Outcome("seamlog.bead.measure", "\n".join(lines), document, ending)
+
+
+def _document(item: "AssessedPhoto", parts: list["Inspected"]) -> dict[str, Any]:
+    """Summary of a photo with its surface and each judged limit; the verdict is the worst."""
+    from seamlog.results import worst
+
+    own = {part.part: part for part, _, _ in parts if part.index == item.part.index}
+    judged = [part.verdict for part in own.values() if part.criteria]
+    surface = own["surface"].figures if "surface" in own else []
+    criteria = [criterion for part in own.values() for criterion in part.criteria]
+    verdict = worst(judged) if judged else item.part.verdict
+    return item.summary() | {
+        "verdict": verdict.value,
+        "surface": {figure.name: figure.value for figure in surface},
+        "limits": [
+            criterion.model_dump(mode="json", include={"name", "value", "verdict", "reason"})
+            for criterion in criteria
+        ],
+    }
 
 
 def _lines(document: dict[str, Any]) -> list[str]:
@@ -133,4 +178,10 @@ def _lines(document: dict[str, Any]) -> list[str]:
     )
     lines.append(f"  {document['stations']} stations, {document['flagged']} flagged")
     lines.append(f"  toes: {document['toe_definition']}")
+    if document["surface"].get("spatter_count") is not None:
+        lines.append(f"  spatter: {document['surface']['spatter_count']} drops")
+    lines += [
+        f"  {limit['verdict']}: {limit['name']} {limit['reason']}".rstrip()
+        for limit in document["limits"]
+    ]
     return [*lines, *(f"  warning: {text}" for text in document["warnings"])]

@@ -95,7 +95,8 @@ def session(weld: Path) -> Iterator[Session]:
 def test_the_planted_cause_is_found(session: Session, weld: Path) -> None:
     photo = weld.with_name("weld.bead.jpg")
     parts = bead_and_join(session, session.welds, (photo,), "left")
-    (bead_part, _, _), (join, tables, _) = parts
+    assert [part.part for part, _, _ in parts] == ["bead", "surface", "join"]
+    (bead_part, _, _), _, (join, tables, _) = parts
     truth = json.loads(session.metadata["seamlog.truth"]["json"])
     planted, profile = truth["planted_cause"], truth["profile"]
     (cause,) = join.details["causes"]

@@ -1,0 +1,1 @@
+"""Surface: what lies on bead and plate: spatter, gaps, craters, candidates, laser profiles."""

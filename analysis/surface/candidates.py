@@ -1,0 +1,166 @@
+"""Places of a bead that a person should look at: pores, cracks, undercut. Never verdicts.
+
+From above a pore is a dark closed blob in the bead, a crack a thin dark line in it, undercut a
+stretch of toe with a broader shadow than elsewhere. Slag, ripples and scratches look alike.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from seamlog.analysis.bead.image import Photo
+from seamlog.analysis.bead.measurement import BeadMeasurement
+from seamlog.analysis.bead.plane import Plane
+
+from .blobs import Grid, find_blobs
+from .spatter import bead_mask
+
+Floats = NDArray[np.float64]
+
+MOST = 6
+"""Candidates of one kind that are shown, the most striking first."""
+_PORE_SCORE = 7.0
+_PORE = (0.03, 0.2)
+_CRACK_LENGTH = 0.3
+_CRACK_ASPECT = 5.0
+_UNDERCUT_LENGTH = 0.5
+_TILE_PX = 160
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A place to look at: `kind`, place in the photo and along the bead, how striking it is."""
+
+    kind: str
+    x_px: float
+    y_px: float
+    s: float
+    score: float
+
+
+def find_candidates(photo: Photo, plane: Plane, bead: BeadMeasurement) -> list[Candidate]:
+    """Candidates of each kind, the most striking first."""
+    width_px = float(np.nanmedian(bead.width)) / bead.unit_per_px
+    light = np.ascontiguousarray(photo.opponent()[..., 0])
+    reach = int(max(2, 0.06 * width_px))
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    inner = np.asarray(cv2.erode(bead_mask(photo, bead).astype(np.uint8), kernel) > 0)
+    found = [
+        *_pores(light, inner, width_px),
+        *_cracks(light, inner, width_px),
+        *_undercut(light, plane, bead),
+    ]
+    return [_placed(bead, *item) for item in found]
+
+
+def _placed(bead: BeadMeasurement, kind: str, x: float, y: float, score: float) -> Candidate:
+    nearest = int(np.argmin(np.hypot(*(bead.centre_px - (x, y)).T)))
+    return Candidate(kind, x, y, float(bead.s[nearest]), score)
+
+
+_Found = list[tuple[str, float, float, float]]
+
+
+def _best(found: _Found) -> _Found:
+    return sorted(found, key=lambda item: -item[3])[:MOST]
+
+
+def _pores(light: Grid, inner: NDArray[np.bool_], width_px: float) -> _Found:
+    low, high = (max(1.5, part * width_px / 2) for part in _PORE)
+    blobs = find_blobs(light, inner, low, high)
+    dark = (blobs.contrast < 0) & (blobs.score > _PORE_SCORE)
+    chosen = blobs.chosen(dark)
+    rows = zip(chosen.x_px, chosen.y_px, chosen.score, strict=True)
+    return _best([("pore", float(x), float(y), float(score)) for x, y, score in rows])
+
+
+def _cracks(light: Grid, inner: NDArray[np.bool_], width_px: float) -> _Found:
+    """Thin dark lines: what closing with a small disc fills, as long narrow pieces."""
+    size = 2 * int(max(2, 0.03 * width_px)) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    depth = np.asarray(cv2.morphologyEx(light, cv2.MORPH_BLACKHAT, disc)) * inner
+    known = depth[inner]
+    if not known.size:
+        return []
+    limit = float(np.median(known)) + 6 * 1.4826 * float(
+        np.median(np.abs(known - np.median(known)))
+    )
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((depth > limit).astype(np.uint8))
+    found: _Found = []
+    for piece in range(1, count):
+        left, top, wide, high, area = (int(value) for value in stats[piece])
+        if max(wide, high) < _CRACK_LENGTH * width_px:
+            continue
+        rows, columns = np.nonzero(labels[top : top + high, left : left + wide] == piece)
+        length = float(np.hypot(wide, high))
+        if length * length / area < _CRACK_ASPECT:
+            continue
+        strength = float(depth[rows + top, columns + left].mean()) / max(limit, 1.0)
+        found.append(
+            ("crack", columns.mean() + left, rows.mean() + top, strength * length / width_px)
+        )
+    return _best(found)
+
+
+def _undercut(light: Grid, plane: Plane, bead: BeadMeasurement) -> _Found:
+    """Stretches of a toe whose shadow is darker and broader than along the rest of it."""
+    usual = float(np.nanmedian(bead.width))
+    found: _Found = []
+    for toe in (bead.left_px, bead.right_px):
+        outwards = plane.to_plane(toe) - plane.to_plane(bead.centre_px)
+        outwards /= np.maximum(np.hypot(*outwards.T), 1e-9)[:, None]
+        beyond = np.linspace(0.0, 0.12, 7)[1:] * usual
+        places = plane.to_plane(toe)[:, None] + beyond[None, :, None] * outwards[:, None]
+        px = plane.to_px(places.reshape(-1, 2)).reshape(*places.shape)
+        shadow = _sampled(light, px).mean(axis=1)
+        far = plane.to_plane(toe) + 0.4 * usual * outwards
+        plate = _sampled(light, plane.to_px(far)[:, None])[:, 0]
+        found += _dark_runs(plate - shadow, toe, bead, usual)
+    return _best(found)
+
+
+def _sampled(light: Grid, px: Floats) -> Floats:
+    at = np.nan_to_num(px, nan=-1.0).astype(np.float32)
+    sampled = cv2.remap(
+        light, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    return np.asarray(sampled, dtype=np.float64)
+
+
+def _dark_runs(depth: Floats, toe: Floats, bead: BeadMeasurement, usual: float) -> _Found:
+    good = bead.good
+    if good.sum() < 10:
+        return []
+    middle = float(np.median(depth[good]))
+    spread = 1.4826 * float(np.median(np.abs(depth[good] - middle))) + 1.0
+    dark = good & (depth > middle + 3 * spread) & (depth > 0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], dark.astype(np.int8), [0]])))
+    found: _Found = []
+    for first, stop in edges.reshape(-1, 2):
+        if bead.s[stop - 1] - bead.s[first] >= _UNDERCUT_LENGTH * usual:
+            at = int(first + np.argmax(depth[first:stop]))
+            x, y = (float(value) for value in toe[at])
+            found.append(("undercut", x, y, float((depth[at] - middle) / spread)))
+    return found
+
+
+def contact_sheet(photo: Photo, candidates: list[Candidate], reach_px: float) -> NDArray[np.uint8]:
+    """Numbered crops of all candidates, each `2 reach_px` wide; uint8 BGR."""
+    picture = photo.as_bgr8()
+    side = 2 * int(reach_px) + 1
+    tiles = []
+    for number, item in enumerate(candidates, 1):
+        crop = cv2.getRectSubPix(picture, (side, side), (item.x_px, item.y_px))
+        tile = cv2.resize(crop, (_TILE_PX, _TILE_PX), interpolation=cv2.INTER_AREA)
+        text = f"{number} {item.kind}"
+        for colour, thick in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+            cv2.putText(
+                tile, text, (5, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, colour, thick, cv2.LINE_AA
+            )
+        tiles.append(tile)
+    columns = min(6, len(tiles))
+    tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % columns)
+    rows = [np.hstack(tiles[start : start + columns]) for start in range(0, len(tiles), columns)]
+    return np.asarray(np.vstack(rows), dtype=np.uint8)
