@@ -24,6 +24,11 @@ _STEPS = 24
 _REACH = 3.0
 _CLOSED = 0.35
 """Part of the contrast that a blob keeps in its weakest direction."""
+_SHADOW = 1.4
+"""A gleam and its shadow lie this near to each other, in their radii together."""
+_FEWEST_PAIRS = 4
+_ONE_LIGHT = 0.7
+"""Length of the mean direction from gleam to shadow from which on there is one light."""
 _ABOVE_TEXTURE = 3.0
 """Contrast against the scatter of the surroundings."""
 
@@ -82,7 +87,7 @@ def _find(light: Grid, inside: NDArray[np.bool_], smallest: float, largest: floa
     rows = np.concatenate(candidates)
     rows = rows[np.argsort(-rows[:, 3], kind="stable")]
     seen = _looked_at(light, mask, rows[_apart(rows)])
-    return seen.chosen(np.array(_separate(seen), dtype=np.intp))
+    return _separate(seen)
 
 
 def _blurred(values: Grid, mask: Grid, sigma: float) -> tuple[Grid, Grid]:
@@ -196,12 +201,61 @@ def _half_radius(rays: NDArray[np.floating], core: Floats, level: Floats, place:
     return np.where(below.any(axis=1), place[first], 0.0)
 
 
-def _separate(blobs: Blobs) -> list[int]:
-    """Of blobs that lie in each other the better one."""
+def _separate(blobs: Blobs) -> Blobs:
+    """Of blobs that lie in each other the better one; a gleam and its shadow as one drop."""
     kept: list[int] = []
     for index in np.argsort(-blobs.score, kind="stable"):
         near = np.array(kept, dtype=np.intp)
         far = np.hypot(blobs.x_px[near] - blobs.x_px[index], blobs.y_px[near] - blobs.y_px[index])
         if (far > 0.8 * np.maximum(blobs.radius_px[near], blobs.radius_px[index])).all():
             kept.append(int(index))
-    return kept
+    return _lit_drops(blobs.chosen(np.array(kept, dtype=np.intp)))
+
+
+def _lit_drops(blobs: Blobs) -> Blobs:
+    """Gleam and shadow of a drop become one blob where the light comes from one side.
+
+    Bright and dark marks side by side are pairs by chance unless most pairs point the same way.
+    """
+    x, y, radius = blobs.x_px.copy(), blobs.y_px.copy(), blobs.radius_px.copy()
+    pairs = _pairs(blobs)
+    if len(pairs) < _FEWEST_PAIRS:
+        return blobs
+    gleam, shadow = pairs.T
+    heading = np.arctan2(y[shadow] - y[gleam], x[shadow] - x[gleam])
+    together = np.exp(1j * heading).mean()
+    if abs(together) < _ONE_LIGHT:
+        return blobs
+    gone = np.zeros(len(blobs), dtype=bool)
+    for bright, dark, angle in zip(gleam, shadow, heading, strict=True):
+        if np.cos(angle - np.angle(together)) > 0.7 and not gone[[bright, dark]].any():
+            first, second = (
+                (bright, dark) if blobs.score[bright] >= blobs.score[dark] else (dark, bright)
+            )
+            _grow(x, y, radius, int(first), int(second))
+            gone[second] = True
+    return Blobs(x, y, radius, blobs.contrast, blobs.score).chosen(~gone)
+
+
+def _pairs(blobs: Blobs) -> NDArray[np.intp]:
+    """Bright and dark blobs that touch, nearest first, shape (n, 2)."""
+    bright, dark = np.flatnonzero(blobs.contrast > 0), np.flatnonzero(blobs.contrast < 0)
+    apart_x = blobs.x_px[bright][:, None] - blobs.x_px[dark]
+    apart_y = blobs.y_px[bright][:, None] - blobs.y_px[dark]
+    far = np.hypot(apart_x, apart_y)
+    reach = blobs.radius_px[bright][:, None] + blobs.radius_px[dark]
+    first, second = np.nonzero(far < _SHADOW * reach)
+    order = np.argsort(far[first, second], kind="stable")
+    return np.column_stack([bright[first], dark[second]])[order]
+
+
+def _grow(x: Floats, y: Floats, radius: Floats, drop: int, more: int) -> None:
+    """Make `drop` the circle around both, unless it holds the other already."""
+    far = float(np.hypot(x[more] - x[drop], y[more] - y[drop]))
+    whole = (far + radius[drop] + radius[more]) / 2
+    if whole <= radius[drop] or far == 0:
+        return
+    step = (whole - radius[drop]) / far
+    x[drop] += step * (x[more] - x[drop])
+    y[drop] += step * (y[more] - y[drop])
+    radius[drop] = whole

@@ -25,6 +25,8 @@ _PORE_SCORE = 7.0
 _PORE = (0.03, 0.2)
 _CRACK_LENGTH = 0.3
 _CRACK_ASPECT = 5.0
+_CRACK_STRENGTH = 1.6
+"""Depth against what ripples alone reach."""
 _UNDERCUT_LENGTH = 0.5
 _TILE_PX = 160
 
@@ -98,6 +100,8 @@ def _cracks(light: Grid, inner: NDArray[np.bool_], width_px: float) -> _Found:
         if length * length / area < _CRACK_ASPECT:
             continue
         strength = float(depth[rows + top, columns + left].mean()) / max(limit, 1.0)
+        if strength < _CRACK_STRENGTH:
+            continue
         found.append(
             ("crack", columns.mean() + left, rows.mean() + top, strength * length / width_px)
         )
