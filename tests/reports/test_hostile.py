@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from seamlog.reports.report import Report
-from seamlog.results import Part, Results
+from seamlog.results import Criterion, Figure, Finding, Input, Part, Results, Severity, Verdict
 from tests.browsing import Visitor
 from tests.reports.sample_results import write_sample
 
@@ -69,7 +69,36 @@ ODDITIES = (
     "𝕳𝖔𝖘𝖙𝖎𝖑𝖊 \U0001f4a5 \u0301\u0301\u0301",
     "x" * 3000,
 )
+CLOSERS = (
+    "",
+    '"',
+    "'",
+    "`",
+    '">',
+    "'>",
+    "-->",
+    "]]>",
+    "</script>",
+    "</style>",
+    "</title>",
+    "</textarea>",
+    "</svg>",
+    "</a>",
+    "</noscript>",
+    "</select></option>",
+    "\\",
+    "\\u0022>",
+    "%22%3E",
+    "&quot;>",
+    "\r\n\r\n",
+    "\x00",
+    "\ufeff",
+    "\u2028",
+    "{{",
+)
+"""What ends the place that a text stands in; each before each alert."""
 PAYLOADS = ALERTS + BREAKERS + ODDITIES
+MANY = tuple(dict.fromkeys(PAYLOADS + tuple(f"{a}{b}" for a in CLOSERS for b in ALERTS)))
 KEPT = {"schema", "file", "sha256", "verdict", "severity", "kind"}
 """Fields that are not free text: the model refuses other values."""
 
@@ -92,16 +121,41 @@ def _replaced(value: Any, texts: "count[int]", payloads: tuple[str, ...], key: s
     return value
 
 
-def _write(folder: Path, payloads: tuple[str, ...], first: int) -> Path:
+def _talkative(texts: tuple[str, ...]) -> Part:
+    """A part with every text as message, label, unit, reason, limit and metadata."""
+    figures = [
+        Figure(name=f"f{i}", label=text, value=text if i % 2 else None, unit=text, reason=text)
+        for i, text in enumerate(texts)
+    ]
+    criteria = [
+        Criterion(name=f"c{i}", label=text, value=1.0, unit=text, verdict=Verdict.FAIL, reason=text)
+        for i, text in enumerate(texts)
+    ]
+    findings = [Finding(severity=Severity.WARNING, message=text) for text in texts]
+    return Part(
+        part="talkative",
+        title=texts[0],
+        inputs=[Input(name=text, sha256="0" * 64, bytes=1) for text in texts],
+        figures=figures,
+        criteria=criteria,
+        findings=findings,
+        details={"metadata": {"part": texts[1], "wps": texts[2], "material": texts[3]}},
+    )
+
+
+def _write(folder: Path, payloads: tuple[str, ...], many: tuple[str, ...], first: int) -> Path:
     """A report whose results have a payload in each text field, also in column names."""
     results = write_sample(folder / "results")
     series = {f"{text} {i}": np.arange(5.0) for i, text in enumerate(payloads)}
     table = {"stamp_ns": np.arange(5) * 10**9} | series
     units = {name: str(i % 6) for i, name in enumerate(series)}
     results.write(Part(part="extra", title="extra"), tables={"odd": (table, units)})
+    results.write(_talkative(many))
     texts = count(first)
     for path in sorted((folder / "results").glob("*.json")):
         part = json.loads(path.read_text())
+        if part["part"] == "talkative":
+            continue
         kind = part.pop("part")
         hostile = _replaced(part, texts, payloads)
         path.write_text(json.dumps(hostile | {"part": kind}))
@@ -112,15 +166,16 @@ def _write(folder: Path, payloads: tuple[str, ...], first: int) -> Path:
     return output
 
 
-@pytest.mark.parametrize("first", [0, 17, 33])
+@pytest.mark.parametrize("first", [0, 25])
 def test_hostile_text_leaves_the_page_as_it_is(
     visitor: Visitor, tmp_path: Path, first: int
 ) -> None:
     harmless = tuple(f"text {i}" for i in range(len(PAYLOADS)))
+    quiet = tuple(f"word {i}" for i in range(len(MANY)))
     (tmp_path / "harmless").mkdir()
     (tmp_path / "hostile").mkdir()
-    expected = visitor.open(_write(tmp_path / "harmless", harmless, first))
-    found = visitor.open(_write(tmp_path / "hostile", PAYLOADS, first))
+    expected = visitor.open(_write(tmp_path / "harmless", harmless, quiet, first))
+    found = visitor.open(_write(tmp_path / "hostile", PAYLOADS, MANY, first))
     found.page.wait_for_timeout(100)
     assert found.page.evaluate(SKELETON) == expected.page.evaluate(SKELETON)
     assert found.complaints == []
@@ -128,5 +183,5 @@ def test_hostile_text_leaves_the_page_as_it_is(
     assert found.page.locator("html").get_attribute("data-state") == "live"
 
 
-def test_there_are_fifty() -> None:
-    assert len(set(PAYLOADS)) == 50
+def test_there_are_five_hundred() -> None:
+    assert len(set(MANY)) >= 500

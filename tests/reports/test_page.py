@@ -1,5 +1,9 @@
 """The page in a real browser: alone, live, readable without script, in print, in the dark."""
 
+import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +17,20 @@ from tests.reports.sample_results import OFFSET_MM, SLOW_S_MM, write_sample
 
 WIDTH = "#plot-0-bead-stations-width_mm"
 ERROR = "#plot-0-tracking-error-error_mm"
+
+NO_FONTS = """
+import json
+from playwright.sync_api import sync_playwright
+from tests.browsing import ARGUMENTS
+with sync_playwright() as playwright:
+    browser = playwright.chromium.launch(executable_path="{chromium}", args=ARGUMENTS)
+    page = browser.new_page(viewport={{"width": {width}, "height": 800}})
+    page.goto("{page}")
+    page.wait_for_selector("html[data-state]", state="attached")
+    print(json.dumps(page.evaluate("[document.documentElement.dataset.state, "
+        "document.documentElement.scrollWidth, document.querySelectorAll('canvas').length]")))
+    browser.close()
+"""
 
 
 def _hover(page: Page, plot: str, fraction: float) -> None:
@@ -179,6 +197,24 @@ def test_dark_by_the_system_and_by_the_button(visitor: Visitor, sample_page: Pat
         "before => document.querySelector(before[0]).toDataURL() !== before[1]",
         arg=[f"{WIDTH} canvas", before],
     )
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_without_any_font_the_layout_holds(
+    sample_page: Path, chromium: str, tmp_path: Path, width: int
+) -> None:
+    """A machine without the fonts asked for: the words may be boxes, the page stays in shape."""
+    (tmp_path / "fonts.conf").write_text("<fontconfig><cachedir>/nowhere</cachedir></fontconfig>")
+    fonts = {"FONTCONFIG_FILE": str(tmp_path / "fonts.conf")}
+    # In a process of its own: playwright runs one browser driver per thread.
+    script = NO_FONTS.format(chromium=chromium, page=sample_page.as_uri(), width=width)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, env=os.environ | fonts
+    )
+    assert done.returncode == 0, done.stderr
+    state, wide, plots = json.loads(done.stdout)
+    assert (state, wide <= width) == ("live", True)
+    assert plots >= 10
 
 
 def test_phone_width_does_not_scroll_sideways(visitor: Visitor, sample_page: Path) -> None:
