@@ -33,6 +33,8 @@ COMMANDS: dict[str, tuple[str, str]] = {
         "Save what is left of a damaged or unfinished one.",
     ),
     "attach": ("seamlog.commands.attach:attach", "Put photos, procedures, calibrations in."),
+    "compact": ("seamlog.commands.compact:compact", "Rewrite a session into large chunks."),
+    "export": ("seamlog.commands.export:export", "Session to Parquet, CSV, MAT, video, Rerun."),
     "identify": ("seamlog.analysis.commands.identify:identify", "Find inertia and friction."),
     "replay": ("seamlog.analysis.commands.replay:replay", "Run logged inputs through code again."),
     "sweep": ("seamlog.analysis.commands.sweep:sweep", "Rank many tunings of controllers."),

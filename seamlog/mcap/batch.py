@@ -14,8 +14,9 @@ from seamlog import __version__
 from seamlog.channels import CHANNELS, IMAGE_SCHEMA, Channel
 from seamlog.errors import UnknownName, UsageError
 from seamlog.files import replacing
+from seamlog.mcap.compacting import compact_files
 from seamlog.mcap.compression import COMPRESSIONS, NONE
-from seamlog.mcap.copying import copy_file
+from seamlog.mcap.copying import copy_attachments, copy_file
 from seamlog.mcap.file import McapFile
 from seamlog.mcap.packing import RecordTemplate, payload_records
 from seamlog.mcap.records import Schema
@@ -195,9 +196,25 @@ class BatchWriter:
         """
         if session.is_window:
             raise UsageError("only a whole session can be copied; write the window's columns")
-        lost = list(session.metadata.get(PROBLEMS, {}).values())
         for file in session.files:
             copy_file(file, self._writer, leave_out)
+        self._copy_metadata(session, same_recording)
+
+    def compact_session(self, session: "Session") -> None:
+        """Copy a whole session into large chunks of one channel each; see `copy_session`.
+
+        A session in several files becomes one.
+        """
+        if session.is_window:
+            raise UsageError("only a whole session can be compacted")
+        compact_files(session.files, self._writer, self._compression)
+        for file in session.files:
+            copy_attachments(file, self._writer)
+        self._copy_metadata(session, False)
+
+    def _copy_metadata(self, session: "Session", same_recording: bool) -> None:
+        lost = list(session.metadata.get(PROBLEMS, {}).values())
+        for file in session.files:
             for name, values in file.metadata:
                 if name != PROBLEMS and (name != RECORDING or same_recording):
                     self.add_metadata(name, values)

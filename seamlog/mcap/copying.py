@@ -27,6 +27,11 @@ def copy_file(file: McapFile, writer: FileWriter, leave_out: Collection[str] = (
     for entry in file.index.chunks:
         for chunk in file.iter_chunks([entry]):
             _copy_chunk(file, entry, chunk.data, writer, ids)
+    copy_attachments(file, writer, leave_out)
+
+
+def copy_attachments(file: McapFile, writer: FileWriter, leave_out: Collection[str] = ()) -> None:
+    """Copy the attachments but those named in `leave_out`."""
     for row in file.index.attachments:
         if row.name not in leave_out:
             held = read_attachment(file.source, row, file.limits)

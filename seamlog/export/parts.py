@@ -1,0 +1,59 @@
+"""A topic in parts of bounded size, and what its columns are called and measured in."""
+
+from collections.abc import Iterator
+
+from seamlog.channels import CHANNELS
+from seamlog.mcap.columns import LOG_TIME, Columns
+from seamlog.session import Session
+
+_PART_BYTES = 64 << 20
+
+
+def iter_parts(session: Session, topic: str) -> Iterator[Columns]:
+    """Columns of a topic in order of time, at most about 64 MiB of messages at once."""
+    start, end = session.span
+    sizes = sorted(
+        (entry.start_ns, entry.uncompressed_size)
+        for file in session.files
+        for row in file.channels(topic)
+        for entry in file.entries(row.id, session.span)
+    )
+    held = 0
+    for begins, size in sizes:
+        if held + size > _PART_BYTES and begins > start:
+            yield session.window(start, begins).columns(topic)
+            start, held = begins, 0
+        held += size
+    yield session.window(start, end).columns(topic)
+
+
+def exported_topics(session: Session, wanted: tuple[str, ...]) -> list[str]:
+    """The topics asked for, else all that have messages in the window."""
+    for topic in wanted:
+        session.check_topic(topic)
+    return list(wanted) or [row.topic for row in session.info.channels.values() if row.count]
+
+
+def units_of(session: Session, topic: str) -> dict[str, str]:
+    """Unit of each field, as far as they are known."""
+    import json
+
+    metadata = session.channel_metadata(topic)
+    units = {LOG_TIME: "ns", "stamp_ns": "ns"}
+    if topic in CHANNELS:
+        for field in CHANNELS[topic].fields:
+            unit = metadata.get("unit", "") if field.unit == "metadata" else field.unit
+            if unit:
+                units[field.name] = unit
+    try:
+        stated = json.loads(metadata.get("units", "{}"))
+    except ValueError:
+        stated = {}
+    return units | (stated if isinstance(stated, dict) else {})
+
+
+def file_name(topic: str) -> str:
+    """`/table/encoder` as part of a file's name: `table.encoder`."""
+    import re
+
+    return re.sub(r"[^\w.-]+", ".", topic).strip(".") or "topic"
