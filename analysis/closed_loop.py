@@ -19,7 +19,9 @@ from seamlog.contracts import Axis, Controller
 
 from .compiled import Run, compiled_run
 from .controllers.law import LawController
-from .dynamics import CoulombPlant, Plant, StribeckPlant, make_plant
+from .coulomb_plant import CoulombPlant
+from .plant import Plant, make_plant
+from .stribeck_plant import StribeckPlant
 
 Floats = NDArray[np.float64]
 Step = Callable[..., tuple[float, float]]

@@ -1,12 +1,12 @@
 """The loop of `closed_loop` as machine code (numba, extra `fast`), where the law is a function.
 
 What is compiled is the very source that runs without numba, and only `+ - * /`, square roots and
-comparisons are in it, so the bits are the same. The machine code is kept in numba's cache under a
-key that holds the code of every function in it: a changed law is compiled anew.
+comparisons are in it, so the bits are the same. The machine code is kept in numba's cache in a file
+named after the code of every function in it: a changed law is compiled anew.
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.util import find_spec
 from math import floor
@@ -31,8 +31,8 @@ def compiled_run(law: Function, step: Function) -> Run | None:
     functions = _reached(law, _reached(step, {}))
     for function in functions:
         _make_callable(function)
-    digest = hashlib.sha256(repr([_written(f) for f in functions]).encode()).hexdigest()
-    plain = _make_loop(law, step, digest)
+    plain = _make_loop(law, step)
+    plain.__qualname__ = f"loop_{_digest(functions)}"  # names the file that numba keeps
     try:
         loop: Function = numba.njit(cache=True)(plain)
     except RuntimeError:  # no folder to keep it in
@@ -85,15 +85,22 @@ def _reached(function: Any, found: dict[FunctionType, None]) -> dict[FunctionTyp
     return found
 
 
+def _digest(functions: Iterable[FunctionType]) -> str:
+    """Of all that decides what machine code does, and of the types that numba names in its file."""
+    written = [_written(function) for function in functions]
+    return hashlib.sha256(repr(written).encode()).hexdigest()[:16]
+
+
 def _written(function: FunctionType) -> tuple[Any, ...]:
-    """What `function` does: its code and the numbers that it takes from its module."""
+    """Where `function` is, its types, its code and the numbers that it takes from its module."""
     code = function.__code__
     taken = [function.__globals__.get(name) for name in code.co_names]
     numbers = [value for value in taken if isinstance(value, float | tuple)]
-    return code.co_code, code.co_consts, code.co_names, numbers
+    where = (function.__module__, function.__qualname__, function.__annotations__)
+    return *where, code.co_code, code.co_consts, code.co_names, numbers
 
 
-def _make_loop(law: Function, step: Function, digest: str) -> Function:
+def _make_loop(law: Function, step: Function) -> Function:
     """As `closed_loop._run`, row by row of arrays."""
 
     def loop(  # type: ignore[no-untyped-def]  # noqa: ANN202
@@ -108,7 +115,6 @@ def _make_loop(law: Function, step: Function, digest: str) -> Function:
         rows,  # noqa: ANN001
         states,  # noqa: ANN001
     ):
-        len(digest)  # keeps the digest in the key of the cache
         position, velocity = start
         delay = len(waiting)
         for k in range(len(inputs)):

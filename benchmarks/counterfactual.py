@@ -19,10 +19,10 @@ from scipy import stats
 from seamlog.analysis.axis_record import AxisRecord, Drive
 from seamlog.analysis.closed_loop import ClosedLoop, Reference, simulate
 from seamlog.analysis.controllers.paper import PaperConfig, PaperController
-from seamlog.analysis.dynamics import Ripple, StribeckPlant
 from seamlog.analysis.replay.counterfactual import make_scene, predict_many
 from seamlog.analysis.replay.figures import rms_mm
 from seamlog.analysis.replay.model import identify_model
+from seamlog.analysis.stribeck_plant import Ripple, StribeckPlant
 from seamlog.contracts import Axis, Controller
 
 SEEDS, QUICK_SEEDS = range(1, 6), range(1, 2)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from seamlog.analysis.dynamics import CoulombPlant, held_motion
+from seamlog.analysis.coulomb_plant import CoulombPlant
+from seamlog.analysis.dynamics import held_motion
 from seamlog.contracts import Axis
 from seamlog.errors import HardwareError, PluginFailed
 

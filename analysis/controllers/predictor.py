@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from pydantic import BaseModel, ConfigDict
 
-from seamlog.analysis.dynamics import CoulombPlant
+from seamlog.analysis.coulomb_plant import CoulombPlant
 from seamlog.contracts import Axis
 
 from .inner import InnerController, warnings_of, with_state

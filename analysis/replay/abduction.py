@@ -14,7 +14,7 @@ from scipy import signal
 
 from seamlog.analysis.axis_record import AxisRecord, FloatArray
 from seamlog.analysis.closed_loop import ClosedLoop, Reference, simulate
-from seamlog.analysis.dynamics import Plant
+from seamlog.analysis.plant import Plant
 from seamlog.contracts import Axis, Controller
 
 from .model import replay_plant

@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from seamlog.analysis.axis_record import AxisRecord, FloatArray
-from seamlog.analysis.dynamics import CoulombPlant, Plant, StribeckPlant
+from seamlog.analysis.coulomb_plant import CoulombPlant
 from seamlog.analysis.identification.excitation import refused_values
 from seamlog.analysis.identification.gated import USUAL_DELAY
 from seamlog.analysis.identification.identify import identify_axis
 from seamlog.analysis.live_controller import LiveController
+from seamlog.analysis.plant import Plant
+from seamlog.analysis.stribeck_plant import StribeckPlant
 from seamlog.contracts import Axis
 from seamlog.errors import EvidenceError
 

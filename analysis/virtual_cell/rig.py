@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from seamlog.analysis.dynamics import Ripple, StribeckPlant
+from seamlog.analysis.stribeck_plant import Ripple, StribeckPlant
 from seamlog.contracts import Axis
 
 from .schedule import TICK_S

@@ -12,7 +12,7 @@ from seamlog.analysis.closed_loop import Reference, simulate
 from seamlog.analysis.controllers.batched import BatchedPaper, BatchedPID
 from seamlog.analysis.controllers.paper import PaperConfig, PaperController
 from seamlog.analysis.controllers.pid import PID, PIDConfig
-from seamlog.analysis.dynamics import CoulombPlant
+from seamlog.analysis.coulomb_plant import CoulombPlant
 from seamlog.contracts import Axis, Controller
 from seamlog.errors import UsageError
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from seamlog.analysis.closed_loop import Reference, simulate
-from seamlog.analysis.dynamics import CoulombPlant
+from seamlog.analysis.coulomb_plant import CoulombPlant
 from seamlog.contracts import Axis
 
 from .axis_bench import COULOMB_AXIS, PERIOD_S

@@ -12,7 +12,8 @@ from seamlog.analysis.closed_loop import ClosedLoop, simulate
 from seamlog.analysis.compiled import compiled_run
 from seamlog.analysis.controllers.guard import GuardedController
 from seamlog.analysis.controllers.law import LawController
-from seamlog.analysis.dynamics import Ripple, StribeckPlant, coulomb_step
+from seamlog.analysis.coulomb_plant import coulomb_step
+from seamlog.analysis.stribeck_plant import Ripple, StribeckPlant
 
 from .axis_bench import AXIS, COULOMB_AXIS, ENCODER_STEP_M, PERIOD_S, sine, speed_noise
 

@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 
 from seamlog.analysis.closed_loop import simulate
 from seamlog.analysis.controllers.paper import PaperConfig, PaperController
-from seamlog.analysis.dynamics import CoulombPlant, Ripple, StribeckPlant, axis_from_datasheet
+from seamlog.analysis.coulomb_plant import CoulombPlant
+from seamlog.analysis.dynamics import axis_from_datasheet
 from seamlog.analysis.friction import friction_shape, sliding_friction, smallest_dead_zone_m_s
+from seamlog.analysis.stribeck_plant import Ripple, StribeckPlant
 from seamlog.contracts import Axis
 
 from .axis_bench import AXIS, COULOMB_AXIS, PERIOD_S, sine

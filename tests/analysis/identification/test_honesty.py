@@ -9,11 +9,11 @@ import pytest
 from seamlog.analysis.axis_record import AxisRecord
 from seamlog.analysis.closed_loop import simulate
 from seamlog.analysis.controllers.paper import PaperConfig, PaperController
-from seamlog.analysis.dynamics import StribeckPlant
 from seamlog.analysis.identification.gated import identify_gated
 from seamlog.analysis.identification.identify import identify_axis, select_axis_model
 from seamlog.analysis.identification.residuals import analyse_residual
 from seamlog.analysis.identification.servo import fit_servo
+from seamlog.analysis.stribeck_plant import StribeckPlant
 from seamlog.analysis.virtual_cell import rig
 from seamlog.errors import EvidenceError
 from tests.analysis.conftest import PERIOD_S, record_loop, sine_reference

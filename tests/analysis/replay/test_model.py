@@ -9,12 +9,12 @@ from seamlog.analysis.axis_record import AxisRecord
 from seamlog.analysis.closed_loop import simulate
 from seamlog.analysis.controllers.paper import PaperConfig, PaperController
 from seamlog.analysis.controllers.pd import PD, PDConfig
-from seamlog.analysis.dynamics import Ripple, StribeckPlant
 from seamlog.analysis.replay.batch import Start, World, simulate_worlds
 from seamlog.analysis.replay.counterfactual import make_scene, predict
 from seamlog.analysis.replay.figures import rms_mm, unexplained_miss
 from seamlog.analysis.replay.model import RippleForce, identify_model
 from seamlog.analysis.replay.tables import whole_band_m
+from seamlog.analysis.stribeck_plant import Ripple, StribeckPlant
 from seamlog.contracts import Axis
 
 from .test_replay import LAW, PERIOD_S, TRUTH, MakeLoop, bench_reference

@@ -13,7 +13,6 @@ from seamlog.analysis.axis_record import AxisRecord, load_axis_record
 from seamlog.analysis.closed_loop import ClosedLoop, Reference, simulate
 from seamlog.analysis.controllers.paper import PaperConfig, PaperController
 from seamlog.analysis.controllers.pd import PD, PDConfig
-from seamlog.analysis.dynamics import Ripple, StribeckPlant
 from seamlog.analysis.estimators.gated_rls import GatedRLS, GatedRLSConfig
 from seamlog.analysis.replay.abduction import abduce, reproduce
 from seamlog.analysis.replay.counterfactual import make_scene, predict
@@ -21,6 +20,7 @@ from seamlog.analysis.replay.figures import rms_mm
 from seamlog.analysis.replay.inputs import replay_inputs
 from seamlog.analysis.replay.model import identify_model
 from seamlog.analysis.replay.shadow import shadow_controller, shadow_estimator
+from seamlog.analysis.stribeck_plant import Ripple, StribeckPlant
 from seamlog.cli import run
 from seamlog.contracts import Axis, Controller
 from seamlog.errors import EvidenceError
