@@ -10,7 +10,7 @@ from .feeds import Feed, FixedFeed
 from .folder import iter_items
 from .mcap_writer import SessionFile
 from .pictures import picture_encoder
-from .ring import RECORD, open_ring
+from .ring import RECORD, TAKEN_IN, Ring, open_ring
 from .varying_feed import VaryingFeed
 
 _KIND_AT = RECORD.size + len(CDR_HEADER) + 8
@@ -50,10 +50,14 @@ class Intake:
         place = (channel_id, topic, metadata["producer"], ring, self._file)
         if ring.stride:
             self.feeds.append(FixedFeed(*place))
-            return
+        else:
+            self.feeds.append(self._varying(topic, place))
+        ring.words[TAKEN_IN] = 1
+
+    def _varying(self, topic: str, place: tuple[int, str, str, Ring, SessionFile]) -> VaryingFeed:
         is_picture = CHANNELS[topic].schema == IMAGE_SCHEMA
-        encode = picture_encoder(channel_id) if is_picture else None
-        self.feeds.append(VaryingFeed(*place, encode, _is_urgent if topic == "/events" else None))
+        encode = picture_encoder(place[0]) if is_picture else None
+        return VaryingFeed(*place, encode, _is_urgent if topic == "/events" else None)
 
 
 def _is_urgent(record: memoryview) -> bool:

@@ -21,6 +21,8 @@ from seamlog.segments import segment_path
 from .folder import Recording
 from .segment import claim, sync_folder
 
+_START_S = 10.0
+"""The loop waits so long at most until the recorder process works."""
 _PATIENCE_S = 30.0
 """`finish` gives up when the recorder process has moved nothing for so long."""
 
@@ -73,6 +75,7 @@ class WritingProcess:
         self._folder = folder
         self._hear = hear
         self._last: dict[str, Any] | None = None
+        self._ready = threading.Event()
         inner, self._pipe = os.pipe()
         own = _own_process()
         passed = [number for number in (partial, lock, inner, own) if number >= 0]
@@ -92,17 +95,23 @@ class WritingProcess:
             os.close(number)
         self._listener = threading.Thread(target=self._listen, name="recorder", daemon=True)
         self._listener.start()
+        self._ready.wait(_START_S)
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
         with self._process.stdout as lines:
             for line in lines:
                 with suppress(ValueError):
-                    said = json.loads(line)
-                    if "channels" in said:
-                        self._last = said
-                    else:
-                        self._hear(said)
+                    self._take(json.loads(line))
+        self._ready.set()
+
+    def _take(self, said: dict[str, Any]) -> None:
+        if "ready" in said:
+            self._ready.set()
+        elif "channels" in said:
+            self._last = said
+        else:
+            self._hear(said)
 
     @property
     def pid(self) -> int:

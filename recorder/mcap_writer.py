@@ -21,7 +21,7 @@ from .syncing import Syncer
 
 CHUNK_BYTES = 256 << 10
 """A chunk closes at this size..."""
-CHUNK_S = 0.08
+CHUNK_S = 0.07
 """...or at this age, by the recorder's own time: with a pass before and one after, within 0.1 s."""
 _BUDGET_MARGIN_BYTES = 512 << 10
 

@@ -1,8 +1,8 @@
 """The recorder process: `python -m seamlog.recorder.process FOLDER FILE PIPE LOOP`.
 
 The three numbers are descriptors: the `.part` file, a pipe that ends with the loop, and the
-loop's process (-1 where the system has none). It prints a JSON object per line: `finding`,
-`warning` and `stop` while it works, the final accounts at its end.
+loop's process (-1 where the system has none). It prints a JSON object per line: `ready`,
+`finding`, `warning` and `stop` while it works, the final accounts at its end.
 """
 
 import json
@@ -31,6 +31,7 @@ def main(arguments: list[str]) -> None:
     partial, pipe, loop = (int(text) for text in arguments[1:])
     os.set_blocking(sys.stdout.fileno(), False)
     engine = Engine(read_recording(folder), folder, partial, _say)
+    _say({"ready": "yes"})
     ending = _record(engine, pipe, loop)
     document = engine.finish(ending)
     os.set_blocking(sys.stdout.fileno(), True)

@@ -27,10 +27,11 @@ from .folder import RESERVED, OutTray, Recording, abandoned_folders, make_folder
 from .gate import Gate
 from .launch import WritingProcess, claim_partial
 from .put_source import Put
-from .ring import Ring
+from .ring import TAKEN_IN, Ring
 from .storage import DEFAULT, Storage, SyncPolicy
 
 _log = logging.getLogger("seamlog.recorder")
+_INTAKE_S = 2.0
 _living: "weakref.WeakSet[Recorder]" = weakref.WeakSet()
 
 
@@ -199,7 +200,16 @@ class Recorder:
             number = len(self._channels)
             made = make_channel(key[0], named, self._tray, self.clock, self._gate, number)
             self._channels[key] = made
+        self._await_intake(made.gate.ring)
         return made
+
+    def _await_intake(self, ring: Ring) -> None:
+        """Until the recorder process watches the ring: from then on chunks close in time."""
+        deadline_s = time.monotonic() + _INTAKE_S
+        while not ring.words[TAKEN_IN] and time.monotonic() < deadline_s:
+            if not self._process.is_alive():
+                return
+            time.sleep(0.001)
 
     def _gate(self, topic: str, ring: Ring) -> Gate:
         waits = self._recording.pace == "simulated"

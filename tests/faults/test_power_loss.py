@@ -38,6 +38,7 @@ class Loss:
         recorder.close()
         disk.power_up()
         found = _stamps(path)
+        path.with_name(path.name + ".part").unlink(missing_ok=True)
         assert found == accepted[: len(found)]
         self.durable_lost = max(durable - len(found), 0)
         self.durable = durable
