@@ -6,13 +6,14 @@ if TYPE_CHECKING:
     from .accounts import Account, Status
     from .channel import Channel
     from .recorder import Recorder
-    from .storage import Storage
+    from .storage import Snapshot, Storage
 
-__all__ = ["Account", "Channel", "Recorder", "Status", "Storage"]
+__all__ = ["Account", "Channel", "Recorder", "Snapshot", "Status", "Storage"]
 _HOMES = {
     "Account": "accounts",
     "Channel": "channel",
     "Recorder": "recorder",
+    "Snapshot": "storage",
     "Status": "accounts",
     "Storage": "storage",
 }

@@ -15,6 +15,7 @@ from .intake import Intake
 from .journal import Journal
 from .mcap_writer import SessionFile, written_files
 from .ring import DROPPED, DURABLE, LAST_SYNC_NS, WRITTEN, Ring
+from .snapshot import SnapshotBuffer
 from .storage import SYNC_S
 from .varying_feed import VaryingFeed
 
@@ -24,6 +25,8 @@ _RETRY_S = 0.1
 _SPACE_FOR_S = 120.0
 """The disk is nearly full when it has room for less than this at the present rate."""
 _MOST_FINDINGS = 100
+CLOSED = "closed"
+"""The ending of a recording that its loop has closed."""
 _LAST_TRIES_S = 2.0
 """How long writing is tried again after the loop has ended."""
 
@@ -57,7 +60,8 @@ class Engine:
         self._feeds: list[Feed] = []
         self._file = SessionFile(recording, folder, descriptor, self._fault, self._mark)
         self._journal = Journal(self._file)
-        self._intake = Intake(folder, self._file)
+        self._snapshot = self._make_snapshot()
+        self._intake = Intake(folder, self._file, self._snapshot)
         self._feeds = self._intake.feeds
         self._file.farewell = self._write_all_accounts
         self._sync_every_s = SYNC_S[recording.storage.sync]
@@ -69,7 +73,16 @@ class Engine:
         self._dropped: dict[int, int] = {}
         self._explained: set[int] = set()
         self._sizes: deque[tuple[float, int]] = deque(maxlen=30)
-        self._has_warned = self._has_stopped = False
+        self._has_warned = self._has_stopped = self._has_warned_of_memory = False
+
+    def _make_snapshot(self) -> SnapshotBuffer | None:
+        if self._recording.snapshot is None:
+            return None
+
+        def note(reason: str, time_ns: int) -> None:
+            self._notes.append(("TRIGGER", f"snapshot: {reason} at {time_ns} ns"))
+
+        return SnapshotBuffer(self._recording.snapshot, self._file, note)
 
     def step(self) -> bool:
         """Do what is due now; True if there is more to do at once."""
@@ -92,7 +105,7 @@ class Engine:
         What cannot be written stays in the rings, and the file keeps its `.part` name.
         """
         try:
-            self._persist(self._drain)
+            self._persist(lambda: self._drain(ending))
             self._persist(lambda: self._sign(ending))
             is_whole = True
         except OSError as error:
@@ -115,6 +128,9 @@ class Engine:
         urgent = [feed for feed in self._feeds if _is_urgent(feed)]
         if urgent:
             self._pump(now_s, flush=True)
+        if self._snapshot is not None:
+            self._snapshot.step()
+            self._warn_of_short_memory(self._snapshot)
         self._sync(now_s, at_once=bool(urgent))
         self._write_notes()
         self._note_gaps()
@@ -122,7 +138,8 @@ class Engine:
             self._watch_clock()
         if now_s - self._status_s >= _STATUS_S and self._recording.pace == "paced":
             self._status_s = now_s
-            self._write_status(self._accounts())
+            if self._snapshot is None or self._snapshot.is_open:
+                self._write_status(self._accounts())
             self._watch_space(now_s)
         if self._file.is_over_budget and not self._has_stopped:
             self._stop()
@@ -186,6 +203,11 @@ class Engine:
             left = f"{free / 2**20:.0f} MiB are free, enough for {free / rate:.0f} s"
             self._say({"warning": f"the disk is nearly full: {left}"})
             self._notes.append(("NOTE", f"the disk is nearly full: {left}"))
+
+    def _warn_of_short_memory(self, snapshot: SnapshotBuffer) -> None:
+        if snapshot.is_short and not self._has_warned_of_memory:
+            self._has_warned_of_memory = True
+            self._say({"warning": "the memory of the snapshot is too small for all of its time"})
 
     def _stop(self) -> None:
         """The budget is used up: the loop is to take nothing more, what it has is written."""
@@ -258,9 +280,14 @@ class Engine:
                     raise
                 time.sleep(_RETRY_S)
 
-    def _drain(self) -> None:
+    def _drain(self, ending: str) -> None:
         self._intake.take()
+        if self._snapshot is not None and ending != CLOSED:
+            self._snapshot.trigger(ending, self._log_time_ns())
         self._pump(time.monotonic(), flush=True)
+        if self._snapshot is not None:
+            self._snapshot.step()
+            self._snapshot.end()
 
     def _sign(self, ending: str) -> None:
         """The last words of the recorder: why it ended; the file adds the accounts."""

@@ -65,8 +65,11 @@ class ChunkSink(Protocol):
         log_times_ns: NDArray[np.uint64],
         offsets: NDArray[np.uint64],
         compression: str,
-    ) -> None:
-        """Write whole records as a chunk that stands alone; after an `OSError` it is not there."""
+    ) -> bool:
+        """Write whole records as a chunk that stands alone; after an `OSError` it is not there.
+
+        False if the chunk is kept for later, and counted then.
+        """
         ...
 
 
@@ -132,18 +135,19 @@ class FixedFeed:
         lost = count - int(whole.sum())
         if lost:
             rows = rows[whole]
-        self._write_rows(rows)
+        is_written = self._write_rows(rows)
         words = self.ring.words
-        words[WRITTEN] += count - lost
+        words[WRITTEN] += count - lost if is_written else 0
         words[LOST] += lost
         words[TAIL] = tail + count
         return tail + count
 
-    def _write_rows(self, rows: NDArray[np.uint8]) -> None:
+    def _write_rows(self, rows: NDArray[np.uint8]) -> bool:
         if not len(rows):
-            return
+            return False
         times = rows[:, _LOG_TIME].copy().view("<u8").ravel()
         offsets = np.arange(len(rows), dtype=np.uint64) * self.ring.stride
         data = np.ascontiguousarray(rows).data.cast("B")
-        self._file.write_chunk(self.channel_id, data, times, offsets, "zstd")
+        is_written = self._file.write_chunk(self.channel_id, data, times, offsets, "zstd")
         self.gaps.note(times)
+        return is_written

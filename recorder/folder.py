@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from seamlog.contracts import Pace
-from seamlog.errors import HardwareError, SpaceMissing
+from seamlog.errors import HardwareError, SpaceMissing, UsageError
 
 from .segment import part_of
-from .storage import Storage
+from .storage import Snapshot, Storage
 
 RESERVED = ("id", "index", "start_ns", "pace", "ring_path", "producer")
 """Keys of the metadata record `seamlog.recording` which are not the user's."""
@@ -50,6 +50,7 @@ class Recording:
     pid: int
     meta: Mapping[str, str]
     storage: Storage = field(default_factory=Storage)
+    snapshot: Snapshot | None = None
 
     @property
     def partial(self) -> Path:
@@ -85,14 +86,18 @@ def make_folder(recording: Recording) -> tuple[Path, int]:
 def read_recording(folder: Path) -> Recording:
     """What `make_folder` wrote."""
     document = json.loads((folder / "recording.json").read_bytes())
-    return Recording(**document | {"storage": Storage(**document["storage"])})
+    storage, snapshot = Storage(**document.get("storage", {})), document.get("snapshot")
+    if snapshot is not None:
+        tuples = {key: tuple(snapshot[key]) for key in ("events", "rules")}
+        snapshot = Snapshot(**snapshot | tuples)
+    return Recording(**document | {"storage": storage, "snapshot": snapshot})
 
 
 def abandoned_folders() -> list[Path]:
     """Folders of recordings whose processes are all dead.
 
     Those whose unfinished session file is gone as well hold nothing anyone could still use and
-    are removed; the others are returned.
+    are removed, those of other versions are left alone; the others are returned.
     """
     kept = []
     for folder in root().iterdir():
@@ -100,8 +105,10 @@ def abandoned_folders() -> list[Path]:
             continue
         try:
             wanted = read_recording(folder).partial.exists()
-        except (OSError, ValueError, TypeError):
+        except FileNotFoundError:
             wanted = False
+        except (OSError, ValueError, TypeError, KeyError, UsageError):
+            continue
         if wanted:
             kept.append(folder)
         else:

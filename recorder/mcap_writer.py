@@ -77,10 +77,11 @@ class SessionFile:
         log_times_ns: NDArray[np.uint64],
         offsets: NDArray[np.uint64],
         compression: str,
-    ) -> None:
+    ) -> bool:
         """Write whole records as a chunk that stands alone."""
         values = (channel_id, data, log_times_ns, offsets, compression)
         self._write(lambda segment: segment.write_chunk(*values))
+        return True
 
     def attach(self, name: str, data: bytes, media_type: str, log_time_ns: int) -> None:
         """Write an attachment."""

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from .engine import Engine
+from .engine import CLOSED, Engine
 from .folder import read_recording
 
 _PASS_MS = 10
@@ -57,7 +57,7 @@ def _record(engine: Engine, pipe: int, loop: int) -> str:
         pause = 0 if engine.step() else _PASS_MS
     os.set_blocking(pipe, False)
     with suppress(BlockingIOError):
-        return "closed" if os.read(pipe, 1) else "the loop died"
+        return CLOSED if os.read(pipe, 1) else "the loop died"
     return "the loop died"
 
 

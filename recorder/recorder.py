@@ -28,7 +28,8 @@ from .gate import Gate
 from .launch import WritingProcess, claim_partial
 from .put_source import Put
 from .ring import TAKEN_IN, Ring
-from .storage import DEFAULT, Storage, SyncPolicy
+from .storage import DEFAULT, Snapshot, Storage, SyncPolicy
+from .trigger_rule import parse_rule
 
 _log = logging.getLogger("seamlog.recorder")
 _INTAKE_S = 2.0
@@ -42,7 +43,7 @@ class Recorder:
     `pace` "paced": a full ring drops the new message; "simulated": `put` waits for room.
     `strict` makes `put` and `log` raise `RecordingError` instead of returning False. `force`
     replaces an existing file. `storage` says how often is synced, where files end, how much disk
-    may be used.
+    may be used. With `snapshot` only what is around a trigger is written.
 
     Raises `OutputExists`, `InputError` (no such folder), `HardwareError`. Afterwards neither
     `put` nor `log` nor `log_frame` raises: they return False and count.
@@ -57,10 +58,13 @@ class Recorder:
         strict: bool = False,
         force: bool = False,
         storage: Storage = DEFAULT,
+        snapshot: Snapshot | None = None,
     ) -> None:
         self.clock: Clock = clock or MonotonicClock()
         self.strict = strict
-        self._recording = _describe(Path(path), meta or {}, self.clock, pace, force, storage)
+        self._recording = _describe(
+            Path(path), meta or {}, self.clock, pace, force, storage, snapshot
+        )
         self._channels: dict[tuple[str, int], Channel] = {}
         self._heard: list[str] = []
         _warn_of_abandoned()
@@ -155,6 +159,14 @@ class Recorder:
         checked = {str(key): str(value) for key, value in values.items()}
         self._check_open()
         self._tray.place({"kind": "metadata", "name": name, "values": checked})
+
+    def trigger(self, reason: str) -> None:
+        """Snapshot mode: write what is kept, and what follows. Costs a file in shared memory."""
+        if self._recording.snapshot is None:
+            raise UsageError("trigger() is for snapshot mode: Recorder(..., snapshot=Snapshot())")
+        self._check_open()
+        item = {"kind": "trigger", "reason": reason, "log_time_ns": self.clock.now_ns()}
+        self._tray.place(item)
 
     def status(self) -> Status:
         """The accounts so far, and what went wrong; the final ones after `close`."""
@@ -303,14 +315,17 @@ def _describe(
     pace: Pace,
     force: bool,
     storage: Storage,
+    snapshot: Snapshot | None,
 ) -> Recording:
     anchor = clock.anchor_ns if isinstance(clock, MonotonicClock) else None
     named = {str(key): str(value) for key, value in meta.items()}
     if taken := sorted(set(named) & set(RESERVED)):
         raise UsageError(f"metadata {', '.join(taken)}: the recorder writes these itself")
+    for rule in snapshot.rules if snapshot else ():
+        parse_rule(rule)
     start, where = clock.now_ns(), str(path.absolute())
     return Recording(
-        uuid.uuid4().hex, where, start, pace, anchor, force, os.getpid(), named, storage
+        uuid.uuid4().hex, where, start, pace, anchor, force, os.getpid(), named, storage, snapshot
     )
 
 

@@ -149,7 +149,7 @@ class RecoveredFile:
         log_times_ns: NDArray[np.uint64],
         offsets: NDArray[np.uint64],
         compression: str,
-    ) -> None:
+    ) -> bool:
         """Write messages of a ring; those that the dying recorder had just written are left out."""
         view = memoryview(data).cast("B")
         starts = offsets.tolist()
@@ -167,6 +167,7 @@ class RecoveredFile:
             self._writer.write_chunk(channel_id, data, log_times_ns, offsets, compression)
             kept = [s for s, wanted in zip(sequences, new.tolist(), strict=True) if wanted]
             self._remember(channel_id, kept, int(log_times_ns.max()))
+        return True
 
     def finish(self) -> None:
         """Write the summary."""

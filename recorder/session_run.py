@@ -13,7 +13,7 @@ from seamlog.files import check_output, write_bytes
 from .accounts import Status
 from .pacing import DurationOver, Pacer
 from .recorder import Recorder
-from .storage import DEFAULT, Storage
+from .storage import DEFAULT, Snapshot, Storage
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,7 @@ def run_source(
     duration_s: float | None = None,
     force: bool = False,
     storage: Storage = DEFAULT,
+    snapshot: Snapshot | None = None,
 ) -> Run:
     """Record `source` into `path`.
 
@@ -41,7 +42,9 @@ def run_source(
     logged nothing, and its error passes through.
     """
     pace: Pace = "paced" if realtime else source.pace
-    recorder = Recorder(path, meta, source.clock, pace, force=force, storage=storage)
+    recorder = Recorder(
+        path, meta, source.clock, pace, force=force, storage=storage, snapshot=snapshot
+    )
     try:
         result, ending = _run(source, recorder, realtime, duration_s)
     except BaseException:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from seamlog.channels import EVENT_KINDS
 from seamlog.errors import UsageError
 
 SyncPolicy: TypeAlias = Literal["eco", "default", "strict"]
@@ -46,3 +47,27 @@ class Storage:
 
 
 DEFAULT = Storage()
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Keep the last `before_s` in memory and write them, and `after_s` more, on a trigger.
+
+    Triggers are `/events` of the kinds `events`, `Recorder.trigger`, `rules` such as
+    "abs(error) > 1 mm" (see `trigger_rule`) and the death of the loop. `memory_bytes` bounds what
+    is kept. `UsageError` for values that make no sense.
+    """
+
+    before_s: float = 10.0
+    after_s: float = 5.0
+    events: tuple[str, ...] = ("FAULT", "EMERGENCY_STOP", "TRIGGER")
+    rules: tuple[str, ...] = ()
+    memory_bytes: int = 512 << 20
+
+    def __post_init__(self) -> None:
+        if not (0 < self.before_s < 86_400 and 0 <= self.after_s < 86_400):
+            raise UsageError("a snapshot keeps some time before its trigger, less than a day")
+        if unknown := sorted(set(self.events) - set(EVENT_KINDS)):
+            raise UsageError(f"snapshot: {', '.join(unknown)} is none of {', '.join(EVENT_KINDS)}")
+        if self.memory_bytes < _LEAST_BYTES:
+            raise UsageError("a snapshot needs at least 1 MiB of memory")

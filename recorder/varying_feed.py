@@ -11,6 +11,7 @@ from .accounts import Account, ring_account
 from .feeds import ChunkSink, Gaps, note_high_water
 from .mcap_writer import CHUNK_BYTES, CHUNK_S
 from .ring import (
+    DISCARDED,
     HEAD,
     LOST,
     MESSAGE,
@@ -93,7 +94,7 @@ class VaryingFeed:
         self._encode = encode
         self._is_urgent = is_urgent
         self._read = int(ring.words[TAIL])
-        self._seen = int(ring.words[WRITTEN] + ring.words[LOST])
+        self._seen = int(ring.words[WRITTEN] + ring.words[LOST] + ring.words[DISCARDED])
         self._batch = _Batch()
         self._oldest_s = 0.0
 
@@ -163,8 +164,8 @@ class VaryingFeed:
     def _write(self) -> None:
         data, times, offsets = self._batch.chunk()
         compression = "" if self._encode else "zstd"
-        self._file.write_chunk(self.channel_id, data, times, offsets, compression)
+        if self._file.write_chunk(self.channel_id, data, times, offsets, compression):
+            self.ring.words[WRITTEN] += len(self._batch)
         self.gaps.note(times)
-        self.ring.words[WRITTEN] += len(self._batch)
         self.ring.words[TAIL] = self._read
         self._batch = _Batch()

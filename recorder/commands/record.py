@@ -15,7 +15,7 @@ from .record_outcome import record_outcome
 from .storage_options import storage_options
 
 if TYPE_CHECKING:
-    from seamlog.recorder.storage import Storage
+    from seamlog.recorder.storage import Snapshot, Storage
 
 
 @command()
@@ -40,6 +40,7 @@ def record(
     duration: float | None,
     live: str | None,
     storage: "Storage",
+    snapshot: "Snapshot | None",
     force: bool,
 ) -> Outcome:
     """Record a live source into a session; Ctrl-C ends the recording and finishes the file."""
@@ -61,7 +62,7 @@ def record(
 
     from seamlog.recorder.session_run import run_source
 
-    run = run_source(source, output, values, pace == "realtime", duration, force, storage)
+    run = run_source(source, output, values, pace == "realtime", duration, force, storage, snapshot)
     return record_outcome(run, output)
 
 

@@ -59,6 +59,8 @@ def _counts(row: "Account") -> str:
 
 def _verdict(run: "Run") -> str:
     rows = run.status.channels
+    if run.status.is_complete and (discarded := sum(row.discarded for row in rows)):
+        return f"Complete: all around the triggers; {discarded} other messages were discarded."
     if run.status.is_complete:
         return "Complete: every message that the source offered is in the session."
     dropped, refused, lost = (

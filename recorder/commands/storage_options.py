@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from seamlog.recorder.storage import Storage
+from seamlog.errors import UsageError
+from seamlog.recorder.storage import Snapshot, Storage
 
 _UNITS = {"": 1, "kib": 1 << 10, "mib": 1 << 20, "gib": 1 << 30, "tib": 1 << 40}
 _UNITS |= {"kb": 10**3, "mb": 10**6, "gb": 10**9, "tb": 10**12}
@@ -47,11 +48,24 @@ _OPTIONS = (
         default="stop",
         help="Remove the oldest files, or stop.",
     ),
+    click.option(
+        "--snapshot",
+        metavar="BEFORE+AFTER",
+        help="Write only what is around a trigger, in seconds: 10+5. Faults and TRIGGER events "
+        "trigger, as does the death of the loop.",
+    ),
+    click.option(
+        "--trigger",
+        "rules",
+        multiple=True,
+        metavar="RULE",
+        help="Trigger by a value: 'abs(error) > 1 mm', '/weld/process.current_a < 20 A'.",
+    ),
 )
 
 
 def storage_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options; the command gets one `storage`."""
+    """Add the options; the command gets one `storage` and one `snapshot`."""
 
     @functools.wraps(function)
     def run(
@@ -61,11 +75,26 @@ def storage_options(function: Callable[..., Any]) -> Callable[..., Any]:
         segment_duration: float,
         budget: int | None,
         over_budget: Any,
+        snapshot: str | None,
+        rules: tuple[str, ...],
         **others: Any,
     ) -> Any:
         storage = Storage(sync, segment_size, segment_duration, budget, over_budget)
-        return function(*arguments, storage=storage, **others)
+        kept = _snapshot(snapshot, rules)
+        return function(*arguments, storage=storage, snapshot=kept, **others)
 
     for option in reversed(_OPTIONS):
         run = option(run)
     return run
+
+
+def _snapshot(span: str | None, rules: tuple[str, ...]) -> Snapshot | None:
+    if span is None:
+        if rules:
+            raise UsageError("--trigger is for snapshot mode: add --snapshot 10+5")
+        return None
+    before, plus, after = span.partition("+")
+    try:
+        return Snapshot(float(before), float(after) if plus else 0.0, rules=rules)
+    except ValueError:
+        raise UsageError(f"--snapshot {span!r}: write seconds before+after, as 10+5") from None
