@@ -114,6 +114,7 @@ class Frames(Sequence[Frame]):
 
     def _stamp(self, place: _Place) -> int:
         if place.entry.compression == "":
+            place.file.source.used()
             start = place.entry.offset + place.entry.length - place.entry.compressed_size
             data = place.file.source.data[start : start + place.entry.compressed_size]
         else:

@@ -122,19 +122,22 @@ class Session:
             raise ChannelMissing(f"{self.path} has no channel {topic}; there are: {known}")
 
     def columns(self, topic: str, fields: Sequence[str] | None = None) -> Columns:
-        """Field name to array, sorted by `log_time_ns` (int64, always there).
+        """Field name to array in the order of capture, which `log_time_ns` (int64) tells.
 
+        Where the recorder's clock stepped back, order stays and `problems` says so.
         Nested fields have dotted names; fixed arrays are 2-D; strings and sequences are object
         arrays. `stamp_ns` (int64) is the time of the event where the messages carry one.
         `fields` picks some, `UnknownName` for others. Raises `ChannelMissing`.
         """
         self.check_topic(topic)
-        parts = [
-            file.columns(row, fields, self.span)
-            for file in self.files
-            for row in file.channels(topic)
-        ]
-        return by_log_time(_joined(parts, f"{self.path}: {topic}"))
+        parts, is_kept = [], False
+        for file in self.files:
+            for row in file.channels(topic):
+                part = file.columns(row, fields, self.span)
+                is_kept |= file.kept_order(row, part, self.span)
+                parts.append(part)
+        joined = _joined(parts, f"{self.path}: {topic}")
+        return joined if is_kept else by_log_time(joined)
 
     def table(self, topic: str) -> "pd.DataFrame":
         """`columns` as a table; an array `values` of n gives columns `values[0]` and so on."""

@@ -41,4 +41,5 @@ def _unpacked(source: FileSource, entry: ChunkEntry, limits: Limits) -> memoryvi
     unpacked = decompress(data[start:end], entry.compression, size, limits.chunk_bytes)
     if crc and crc32(unpacked) != crc:
         raise Malformed("its CRC is wrong")
+    source.used(entry.length)
     return memoryview(unpacked)

@@ -27,6 +27,8 @@ from seamlog.mcap.source import FileSource
 _LOG = logging.getLogger("seamlog")
 ENDLESS = (0, 1 << 64)
 """The window that holds every log time."""
+_FEW_STEPS = 100
+"""More steps back than this are no clock that was set but times that were never in order."""
 _STAMPS = ("header.stamp", "stamp", "timestamp")
 _PARTS = (("sec", "nanosec"), ("seconds", "nanos"), ("secs", "nsecs"), ("sec", "nsec"))
 """Names of seconds and nanoseconds: ROS 2, protobuf, ROS 1, and Foxglove's JSON."""
@@ -142,6 +144,28 @@ class McapFile:
                 f"{self.path}: {channel.topic} holds {count} readable messages where the summary "
                 f"counts {expected}"
             )
+
+    def kept_order(self, channel: ChannelRecord, columns: Columns, window: tuple[int, int]) -> bool:
+        """Whether the clock stepped back while the channel was captured, so that order must stay.
+
+        It did if log times fall back now and then while sequence numbers go on; then it is noted.
+        Times that are merely jumbled are left to be sorted.
+        """
+        times = columns[LOG_TIME]
+        back = np.flatnonzero(np.diff(times) < 0)
+        if not len(back) or len(back) > len(times) // 20 or len(back) > _FEW_STEPS:
+            return False
+        batches = iter_batches(self.iter_chunks(self.entries(channel.id, window)), channel.id)
+        sequences = np.concatenate([batch.sequences() for batch in batches])
+        if not (sequences[1:] > sequences[:-1]).all():
+            return False
+        step = int(times[back[0]] - times[back[0] + 1]) * 1e-9
+        self.note(
+            f"{self.path}: {channel.topic}: the recorder's clock stepped back {len(back)} times, "
+            f"first by {step:.3g} s behind {times[back[0]]} ns; messages stay in the order of "
+            "their capture"
+        )
+        return True
 
     def message_places(self, entry: ChunkEntry, channel_id: int) -> list[tuple[int, int]]:
         """Log time and offset in the unpacked chunk of each message of the channel."""

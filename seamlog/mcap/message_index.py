@@ -23,6 +23,7 @@ def read_message_index(source: FileSource, entry: ChunkEntry, channel_id: int) -
     """Rows of uint64 log time and uint64 offset in the unpacked chunk; None if unusable."""
     at = entry.index_offsets.get(channel_id, 0)
     start = at + records.RECORD_HEAD.size + _KEY.size
+    source.used()
     if not at or start > source.size:
         return None
     opcode, length = records.RECORD_HEAD.unpack_from(source.data, at)

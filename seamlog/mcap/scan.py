@@ -162,6 +162,7 @@ class _Scanner:
 
     def _take(self, opcode: int, offset: int, length: int) -> None:
         content = self.source.data[offset + _HEAD : offset + length]
+        self.source.used()
         if opcode == records.MESSAGE_INDEX:
             self._take_message_index(offset, length, content)
             return

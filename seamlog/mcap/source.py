@@ -7,6 +7,9 @@ from pathlib import Path
 from seamlog.errors import SessionError
 from seamlog.mcap.records import MAGIC, RECORD_HEAD, Malformed
 
+_AROUND = 64 << 10
+"""What the kernel maps around a byte that is read."""
+_HELD = 48 << 20
 _PAGE = 512
 """What a disk loses at once, and fills with zeros."""
 
@@ -25,6 +28,7 @@ class FileSource:
                 )
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self._data: memoryview | None = memoryview(self._map)
+        self._in_memory = 0
         if not _may_be_mcap(self.data):
             self.close()
             raise SessionError(
@@ -38,6 +42,16 @@ class FileSource:
         if self._data is None:
             raise SessionError(f"{self.path} is closed; read it before, inside its with block")
         return self._data
+
+    def used(self, size: int = _AROUND) -> None:
+        """Say that `size` more bytes were read; now and then their pages are given back.
+
+        So a reader's memory does not grow with the file; what is still needed comes again.
+        """
+        self._in_memory += size
+        if self._in_memory > _HELD and hasattr(self._map, "madvise"):
+            self._map.madvise(mmap.MADV_DONTNEED)
+            self._in_memory = 0
 
     def content(self, offset: int, length: int, opcode: int) -> memoryview:
         """Content of the record of `length` bytes at `offset`; `Malformed` if it is another."""

@@ -8,10 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 
 import seamlog
-from tests.core.scenarios import SCENARIOS, Expected, assert_same
+from seamlog import messages
+from seamlog.channels import CHANNELS
+from tests.core.scenarios import SCENARIOS, Expected, assert_same, times
 
 OWN = ("numeric_zstd", "numeric_lz4", "numeric_uncompressed", "events_and_paths", "live")
 
@@ -113,3 +116,25 @@ def test_the_javascript_reader_reads(
     assert found["profile"] == "ros2"
     counts = {topic: seen["count"] for topic, seen in found["topics"].items()}
     assert counts == {topic: len(columns["stamp_ns"]) for topic, columns in expected.items()}
+
+
+@pytest.mark.parametrize("numbered", [True, False])
+def test_order_is_that_of_capture_whatever_the_clock_did(tmp_path: Path, numbered: bool) -> None:
+    """A clock that steps back keeps the order; jumbled times without numbers are sorted."""
+    encoder = CHANNELS["/table/encoder"]
+    stamps = times(40).tolist()
+    log = [time if place < 20 else time - 3_000_000_000 for place, time in enumerate(stamps)]
+    with (tmp_path / "x.mcap").open("xb") as file:
+        writer = Writer(file, chunk_size=500)
+        writer.start("ros2", "test")
+        text = messages.definition(encoder).encode()
+        schema = writer.register_schema(encoder.schema, "ros2msg", text)
+        channel = writer.register_channel(encoder.topic, "cdr", schema)
+        for place, (time, stamp) in enumerate(zip(log, stamps, strict=True)):
+            payload = messages.encode(encoder, (stamp, float(place), 0.0))
+            writer.add_message(channel, time, payload, stamp, place + 1 if numbered else 0)
+        writer.finish()  # type: ignore[no-untyped-call]
+    with seamlog.open_session(tmp_path / "x.mcap") as session:
+        found = session.columns(encoder.topic)["stamp_ns"].tolist()
+        assert (found == stamps) == numbered
+        assert any("stepped back" in problem for problem in session.problems) == numbered
