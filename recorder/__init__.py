@@ -5,17 +5,29 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .accounts import Account, Status
     from .channel import Channel
+    from .joining import JoinedProducer, join
     from .recorder import Recorder
     from .storage import Snapshot, Storage
 
-__all__ = ["Account", "Channel", "Recorder", "Snapshot", "Status", "Storage"]
+__all__ = [
+    "Account",
+    "Channel",
+    "JoinedProducer",
+    "Recorder",
+    "Snapshot",
+    "Status",
+    "Storage",
+    "join",
+]
 _HOMES = {
     "Account": "accounts",
     "Channel": "channel",
+    "JoinedProducer": "joining",
     "Recorder": "recorder",
     "Snapshot": "storage",
     "Status": "accounts",
     "Storage": "storage",
+    "join": "joining",
 }
 
 

@@ -70,10 +70,13 @@ def make_channel(
     gate_to: Callable[[str, Ring], Gate],
     number: int,
 ) -> Channel:
-    """Make the ring of a channel, hand it to the recorder process and build its writer."""
+    """Make the ring of a channel, hand it to the recorder process and build its writer.
+
+    `number` is the one of its item in the tray.
+    """
     row = known_row(topic)
     path = tray.next_path(".ring")
-    channel_id = FIRST_CHANNEL_ID + number
+    channel_id = FIRST_CHANNEL_ID + number - 1
     if is_fixed(row):
         ring = fixed_ring(path, channel_id, layout(topic))
         gate = gate_to(topic, ring)

@@ -14,7 +14,7 @@ from .folder import Recording
 from .intake import Intake
 from .journal import Journal
 from .mcap_writer import SessionFile, written_files
-from .ring import DROPPED, DURABLE, LAST_SYNC_NS, WRITTEN, Ring
+from .ring import DROPPED, DURABLE, ENDED, LAST_SYNC_NS, WRITTEN, Ring
 from .snapshot import SnapshotBuffer
 from .storage import SYNC_S
 from .varying_feed import VaryingFeed
@@ -22,6 +22,7 @@ from .varying_feed import VaryingFeed
 _STATUS_S = 1.0
 _CLOCK_STEP_NS = 100_000_000
 _RETRY_S = 0.1
+_GRACE_S = 0.05
 _SPACE_FOR_S = 120.0
 """The disk is nearly full when it has room for less than this at the present rate."""
 _MOST_FINDINGS = 100
@@ -282,6 +283,11 @@ class Engine:
 
     def _drain(self, ending: str) -> None:
         self._intake.take()
+        for feed in self._feeds:
+            feed.ring.words[ENDED] = 1
+        if self._intake.has_joined:
+            # A put of another process may be between its look at ENDED and its last store.
+            time.sleep(_GRACE_S)
         if self._snapshot is not None and ending != CLOSED:
             self._snapshot.trigger(ending, self._log_time_ns())
         self._pump(time.monotonic(), flush=True)

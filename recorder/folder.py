@@ -3,6 +3,7 @@
     /dev/shm/seamlog-<uid>/<recording id>/
         recording.json          what is recorded, where to, by whom
         lock                    locked while the loop or the recorder process lives
+        tray                    locked while a loop places an item
         000001.json             an item: a channel, an attachment or a metadata record
         000001.ring, .data      what belongs to it
 
@@ -18,6 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -116,20 +118,25 @@ def abandoned_folders() -> list[Path]:
     return kept
 
 
+def is_locked(folder: Path) -> bool:
+    """True while the loop or the recorder process of a recording lives."""
+    lock = os.open(folder / "lock", os.O_RDWR | os.O_CLOEXEC)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(lock)
+    return False
+
+
 def _is_abandoned(folder: Path) -> bool:
     try:
         if time.time() - folder.stat().st_mtime < _SETTLED_S:
             return False
-        lock = os.open(folder / "lock", os.O_RDWR | os.O_CLOEXEC)
+        return not is_locked(folder)
     except OSError:
         return False
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    finally:
-        os.close(lock)
-    return True
 
 
 def _place(path: Path, data: bytes) -> None:
@@ -139,19 +146,36 @@ def _place(path: Path, data: bytes) -> None:
 
 
 class OutTray:
-    """Where the loop puts items; any thread may."""
+    """Where loops put items; any thread and process may, one at a time."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.lock = threading.RLock()
+        self._lock = threading.RLock()
+        self._depth = 0
         self._next = 1
 
+    @contextmanager
+    def turn(self) -> Iterator[int]:
+        """Be the one who places the next item; yields its number."""
+        with self._lock, ExitStack() as stack:
+            if not self._depth:
+                gate = os.open(self.folder / "tray", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+                stack.callback(os.close, gate)
+                fcntl.flock(gate, fcntl.LOCK_EX)
+                while (self.folder / f"{self._next:06d}.json").exists():
+                    self._next += 1
+            self._depth += 1
+            try:
+                yield self._next
+            finally:
+                self._depth -= 1
+
     def next_path(self, suffix: str) -> Path:
-        """Path for what belongs to the next item; hold `lock` until it is placed."""
+        """Path for what belongs to the next item; in a turn that ends after it is placed."""
         return self.folder / f"{self._next:06d}{suffix}"
 
     def place_data(self, data: bytes) -> str:
-        """Store `data` for the next item and return its file name; hold `lock` until then."""
+        """Store `data` for the next item and return its file name; in a turn."""
         file = self.next_path(".data")
         try:
             file.write_bytes(data)
@@ -163,7 +187,7 @@ class OutTray:
 
     def place(self, item: Mapping[str, Any]) -> None:
         """Hand over `item`."""
-        with self.lock:
+        with self.turn():
             _place(self.next_path(".json"), json.dumps(item).encode())
             self._next += 1
 

@@ -27,6 +27,8 @@ class Intake:
         self._snapshot = snapshot
         self._next = 1
         self.feeds: list[Feed] = []
+        self.has_joined = False
+        """Processes other than the loop log too."""
 
     def take(self) -> None:
         """Take in what has arrived; after an `OSError` the item stays and comes again."""
@@ -50,6 +52,7 @@ class Intake:
     def _add_channel(self, item: dict[str, Any]) -> None:
         topic, channel_id, metadata = item["topic"], item["channel_id"], item["metadata"]
         ring = open_ring(self._folder / item["ring"])
+        self.has_joined |= "producer_pid" in metadata
         self._file.add_channel(topic, channel_id, metadata)
         sink: ChunkSink = self._file
         if self._snapshot is not None:

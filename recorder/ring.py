@@ -6,7 +6,7 @@ A ring is a file of a header page and `capacity` bytes of records. All words of 
 instructions leaves the accounts exact. Other rings count them in bytes.
 
 Layout: the header page holds 64-bit little-endian words, numbered as below: 0-6 of the producer,
-16-23 of the consumer, 32-34 that the ring is one, its capacity and its stride; from byte 1024 on
+16-24 of the consumer, 32-34 that the ring is one, its capacity and its stride; from byte 1024 on
 two bytes of length and the text why a message was turned away first. Records follow at byte 4096:
 fixed-width messages stand in slots of `stride` bytes, message n in slot n % slots, and `head` and
 `tail` count messages; others stand one behind the other as MCAP Message records (or RAW_FRAME,
@@ -35,6 +35,8 @@ MAGIC = int.from_bytes(b"SEAMRING", "little")
 """Words of the producer; the two sequences are stored plus one, 0 means none."""
 (TAIL, WRITTEN, LOST, HIGH_WATER_PPM, LAST_SYNC_NS, DISCARDED, DURABLE, TAKEN_IN) = range(16, 24)
 """Words of the consumer, on a cache line of their own; TAKEN_IN is 1 once it watches the ring."""
+ENDED = 24
+"""Word of the consumer: 1 once the recording ends; what comes later is not written."""
 (MAGIC_WORD, CAPACITY, STRIDE) = range(32, 35)
 _REASON_AT, _REASON_BYTES = 1024, 1000
 

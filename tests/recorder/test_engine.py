@@ -37,7 +37,7 @@ class Cell:
         self.channels: list[Channel] = []
 
     def channel(self, topic: str) -> Channel:
-        metadata, number = {"producer": "main"}, len(self.channels)
+        metadata, number = {"producer": "main"}, len(self.channels) + 1
         made = make_channel(topic, metadata, self._tray, self.clock, self._gate, number)
         self.channels.append(made)
         return made
