@@ -11,7 +11,7 @@ from pydantic import Field, computed_field
 from seamlog.results import Criterion, Figure, Severity, Verdict
 
 from .block import Block
-from .curves import Column, Histogram, SeamPlot, TimePlot
+from .curves import Column, CurvePlot, Histogram, SeamPlot, TimePlot
 
 
 class PlaceLink(Block):
@@ -227,6 +227,7 @@ AnyBlock = Annotated[
     | Table
     | TimePlot
     | SeamPlot
+    | CurvePlot
     | Histogram
     | PictureBlock
     | Frames

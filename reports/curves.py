@@ -105,6 +105,12 @@ class SeamPlot(Plot):
     kind: Literal["seam_plot"] = "seam_plot"
 
 
+class CurvePlot(Plot):
+    """Curves over a quantity of their own."""
+
+    kind: Literal["curve_plot"] = "curve_plot"
+
+
 class Histogram(Block):
     """How often values fall between the edges (one more edge than counts)."""
 

@@ -8,7 +8,7 @@ from seamlog.results import Figure, Part
 
 from .content import AnyBlock, CriterionTable, FigureTable, Findings, Heading, Notice, Table
 from .pictures import frame_blocks, picture_block
-from .plots import AXES, plots_of, split_unit
+from .plots import axis_of, plots_of, split_unit
 from .run import KINDS, Run
 from .verdicts import statement
 
@@ -88,8 +88,8 @@ def tables(run: Run, part: Part, leave_out: Collection[str] = ()) -> list[AnyBlo
     """Tables that run along neither time nor seam, as text."""
     return [
         _as_text(run, part, name)
-        for name, table in part.tables.items()
-        if name not in leave_out and not set(AXES) & set(table.columns)
+        for name in part.tables
+        if name not in leave_out and axis_of(run, part, name) is None
     ]
 
 
@@ -104,7 +104,8 @@ def _as_text(run: Run, part: Part, name: str) -> Table:
         for row in range(min(count, _MOST_ROWS))
     ]
     header = [split_unit(column)[0] for column in columns]
-    return Table(caption=f"{part.title}: {name}{cut}", header=header, rows=rows)
+    caption = f"{part.title}: {name.replace('_', ' ')}{cut}"
+    return Table(caption=caption, header=header, rows=rows)
 
 
 def _cell(name: str, value: Any, units: dict[str, str]) -> Figure | None:

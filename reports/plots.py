@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from seamlog.errors import UsageError
 from seamlog.results import Part
 
-from .curves import Column, Limit, Mark, SeamPlot, Series, TimePlot
+from .curves import Column, CurvePlot, Limit, Mark, SeamPlot, Series, TimePlot
 from .numbers import COVERAGE, spelled_unit
 from .run import Run, anchor
 
@@ -38,6 +38,8 @@ _SUFFIXES = {
 }
 """Endings of names that are units, longest match first."""
 _LONGEST_LABEL = 32
+_FEWEST = 5
+"""Rows from which a table over a quantity of its own is a curve."""
 _STRIPS = 3
 """From this many plots of one table on, they are drawn as low strips."""
 
@@ -50,16 +52,27 @@ def split_unit(name: str) -> tuple[str, str]:
     return name.replace("_", " "), ""
 
 
-def plots_of(run: Run, part: Part, table: str, title: str = "") -> list[TimePlot | SeamPlot]:
+def plots_of(
+    run: Run, part: Part, table: str, title: str = ""
+) -> list[TimePlot | SeamPlot | CurvePlot]:
     """Every plottable column of a table, one plot per unit; a table without axis gives none."""
-    units = part.tables[table].columns
-    axis = next((name for name in AXES if name in units), None)
+    axis = axis_of(run, part, table)
     if axis is None:
         return []
-    columns = run.columns(part, table)
-    groups = _by_unit(columns, units)
+    columns, units = run.columns(part, table), part.tables[table].columns
+    groups = _by_unit({name: column for name, column in columns.items() if name != axis}, units)
     compact = len(groups) >= _STRIPS
     return [make_plot(run, part, table, names, title, compact=compact) for names in groups]
+
+
+def axis_of(run: Run, part: Part, table: str) -> str | None:
+    """What a table runs along: time, seam, or its first column, if that ascends and has a unit."""
+    names = list(part.tables[table].columns)
+    if shared := next((name for name in AXES if name in names), None):
+        return shared
+    first = run.columns(part, table)[names[0]] if names else np.empty(0)
+    ascends = first.dtype.kind == "f" and first.size >= _FEWEST and bool(np.all(np.diff(first) > 0))
+    return names[0] if ascends and split_unit(names[0])[1] else None
 
 
 def make_plot(
@@ -72,11 +85,12 @@ def make_plot(
     caption: str = "",
     label: str = "",
     compact: bool = False,
-) -> TimePlot | SeamPlot:
-    """One plot of the columns `names` of a table, over time or along the seam."""
+) -> TimePlot | SeamPlot | CurvePlot:
+    """One plot of the columns `names` of a table that has an axis."""
     columns = run.columns(part, table)
     units = part.tables[table].columns
-    axis = next(name for name in AXES if name in columns)
+    axis = axis_of(run, part, table)
+    assert axis is not None
     x, ordered = _ordered(run, axis, columns)
     series = [_series(name, units, ordered, single=len(names) == 1) for name in names]
     words = label or ", ".join(dict.fromkeys(s.label for s in series))
@@ -92,6 +106,10 @@ def make_plot(
     }
     if axis == "stamp_ns":
         return TimePlot(domain=run.time_domain, x_label="time", x_unit="s", **common)
+    if axis not in AXES:
+        domain = f"{run.index}/own/{part.stem}/{axis}"
+        words, unit = split_unit(axis)
+        return CurvePlot(domain=domain, x_label=words, x_unit=unit, **common)
     return SeamPlot(
         domain=run.seam_domain(part) + ("/px" if axis == "s_px" else ""),
         x_label="along the bead on the photo" if part.part == "bead" else "along the seam",

@@ -33,7 +33,8 @@ SectionMaker = Callable[[Sequence[Run]], list[AnyBlock] | None]
 """A section plug-in: the runs to blocks, or None where it has nothing to say about them."""
 
 TITLES = {"verdict": "Verdict", **KINDS, "record": "Inspection record", "provenance": "Provenance"}
-"""Our own sections in the order of the page; those of others follow by name."""
+"""Our own sections in the order of the page; those of others stand before the last ones."""
+_LAST = ("record", "provenance")
 
 
 LARGEST_BYTES = 25_000_000
@@ -151,17 +152,19 @@ class Report:
 
     def _sections(self) -> list[Section]:
         available = plugins.available("seamlog.sections")
-        names = [name for name in TITLES if name in available]
-        names += sorted(set(available) - set(TITLES))
+        names = [name for name in TITLES if name in available and name not in _LAST]
+        names += [*sorted(set(available) - set(TITLES)), *(n for n in _LAST if n in available)]
         if self._chosen is not None:
             names = [name for name in names if name in self._chosen]
         made = []
         for name in names:
+            if name == _LAST[0] and self._chosen is None:
+                made += self._unclaimed(set(available))
             make: SectionMaker = plugins.load("seamlog.sections", name)
             if blocks := make(self.runs):
                 title = TITLES.get(name, name.replace("_", " ").capitalize())
                 made.append(Section(name=name, title=title, blocks=blocks))
-        return made if self._chosen is not None else made + self._unclaimed(set(available))
+        return made
 
     def _unclaimed(self, claimed: set[str]) -> list[Section]:
         """Parts of kinds that no section knows, shown by the uniform rule."""

@@ -16,7 +16,9 @@ from .numbers import format_number
 
 KINDS = {
     "bead": "Bead",
-    "join": "Join of bead and log",
+    "quality": "Quality",
+    "surface": "Surface",
+    "join": "Bead and log",
     "seam": "Seam and path",
     "tracking": "Tracking",
     "replay": "Replay",
@@ -26,8 +28,10 @@ KINDS = {
 """Parts a whole analysis writes, in the order of the report, and what people call them."""
 
 _LONGEST_ANCHOR = 80
-_ON_BEAD = ("bead", "join")
+_ON_BEAD = ("bead", "surface", "quality", "join")
 """Parts whose places are looked up on the bead."""
+_ON_PHOTO = ("bead", "surface", "quality")
+"""Parts whose arc length is that of the bead on its photo."""
 
 
 class Run:
@@ -72,7 +76,7 @@ class Run:
 
     def seam_domain(self, part: Part, weld: int | None = None) -> str:
         """Name of the axis along the seam of `part`'s weld; a photo has an axis of its own."""
-        if part.part == "bead":
+        if part.part in _ON_PHOTO:
             return f"{self.index}/photo/{part.index}"
         return f"{self.index}/seam/{weld or part.weld or part.index}"
 
@@ -100,7 +104,7 @@ class Run:
             return None
         words, seconds = [], None
         if place.s_mm is not None:
-            where = " on the photo" if part.part == "bead" else ""
+            where = " on the photo" if part.part in _ON_PHOTO else ""
             words.append(f"s = {format_number(place.s_mm, 1)} mm{where}")
         if place.time_ns is not None:
             seconds = self.second(place.time_ns)
@@ -108,7 +112,7 @@ class Run:
         domain, x = self.time_domain, seconds
         if place.s_mm is not None and (seconds is None or part.part in _ON_BEAD):
             domain, x = self.seam_domain(part, place.weld), place.s_mm
-        section = "bead" if part.part in _ON_BEAD else part.part
+        section = "bead" if part.part == "join" else part.part
         return PlaceLink(text=", ".join(words), section=anchor(section), domain=domain, x=x)
 
     def lines(self, part: Part, findings: Iterable[Finding]) -> list[FindingLine]:

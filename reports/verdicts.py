@@ -1,6 +1,6 @@
 """The overall verdict: the worst of what was assessed; what was not is said beside it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from seamlog.results import Criterion, Part, Severity, Verdict, worst
 
@@ -19,7 +19,7 @@ def overall(runs: Sequence[Run]) -> Banner:
     return Banner(
         verdict=verdict,
         summary=_summary(verdict, [part for _, part in parts]),
-        reasons=[line for run, part in parts for line in _failures(run, part)],
+        reasons=_distinct(line for run, part in parts for line in _failures(run, part)),
         statements=_statements(runs),
     )
 
@@ -65,6 +65,13 @@ def _counted(verdict: Verdict, criteria: Sequence[Criterion]) -> str:
     if verdict is Verdict.PASS and judged:
         return "The limit is met." if len(judged) == 1 else f"All {len(judged)} limits are met."
     return ""
+
+
+def _distinct(lines: Iterable[FindingLine]) -> list[FindingLine]:
+    """Each reason once: two parts may judge one figure by one limit."""
+    return list(
+        {line.model_dump_json(exclude={"place": {"section"}}): line for line in lines}.values()
+    )
 
 
 def _failures(run: Run, part: Part) -> list[FindingLine]:

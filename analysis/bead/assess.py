@@ -79,6 +79,11 @@ def _assess(
         part = _refused(source, config, index, weld, str(error))
         return AssessedPhoto(part, {}, {}, None, error, name)
     part, tables, pictures = bead_part(result, source.inputs, config, index, weld)
+    if source.calibration is not None:
+        known = source.calibration.model_dump(
+            include={"kind", "date", "source", "residual_mm", "scale_relative_u"}
+        )
+        part = part.model_copy(update={"details": part.details | {"calibration": known}})
     return AssessedPhoto(part, tables, pictures, result, None, name)
 
 

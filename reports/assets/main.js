@@ -10,6 +10,7 @@ function wordsAt(bus, at, domain) {
   const onSeam = Array.from(at.keys()).some((key) => key.includes("/seam"));
   for (const [key, x] of at) {
     if (onSeam && key.includes("/photo")) continue;
+    if (key.includes("/own/")) continue;
     words.push(key.includes("/time") ? `t = ${x.toFixed(2)} s` : `s = ${x.toFixed(1)} ${key.endsWith("/px") ? "px" : "mm"}`);
   }
   const told = new Set();
@@ -76,7 +77,7 @@ async function enliven() {
     const photo = block.kind === "moment" ? block.photo : block.kind === "picture" ? block : null;
     if (photo?.track) bus.photos.push(await makePhoto(document.getElementById(photo.id), photo, read, bus));
     if (block.kind === "frames") cameras.set(block.id, makeFrames(figure, block));
-    if ((block.kind !== "time_plot" && block.kind !== "seam_plot") || !block.live) continue;
+    if (!block.kind.endsWith("_plot") || !block.live) continue;
     const plot = await makePlot(figure, block, read, bus);
     if (plot === null) continue;
     bus.plots.push(plot);

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from seamlog.reports.content import AnyBlock
-from seamlog.reports.curves import Column, Histogram, Limit, SeamPlot, Series, TimePlot
+from seamlog.reports.curves import Column, Histogram, Limit, Plot, Series
 from seamlog.reports.numbers import format_quantity
 from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
 from seamlog.reports.pictures import picture_block, toe_track
@@ -95,7 +95,7 @@ def _on_value(stem: str, name: str) -> tuple[str, ...]:
     return (name, stem, *(f"{stem}_{kind}_{unit}" for kind in ("mean", "min", "max", "station")))
 
 
-def _histogram(plot: SeamPlot | TimePlot) -> list[AnyBlock]:
+def _histogram(plot: Plot) -> list[AnyBlock]:
     series = plot.series[0]
     known = series.values.values[np.isfinite(series.values.values)]
     if known.size < 2 or np.ptp(known) == 0:

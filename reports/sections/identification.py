@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from seamlog.reports.content import AnyBlock, Table
+from seamlog.reports.content import AnyBlock, Fact, FactTable, Table
+from seamlog.reports.numbers import format_quantity
 from seamlog.reports.parts import criteria, each_part, figures, findings, pictures, plots, tables
+from seamlog.reports.plots import split_unit
 from seamlog.reports.run import Run
 from seamlog.reports.verdicts import statement
 from seamlog.results import Figure, Part
@@ -19,6 +21,7 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
     return [
         statement(part),
         *figures(part),
+        *_excitation(part),
         *_comparison(part),
         *findings(run, part),
         *plots(run, part),
@@ -26,6 +29,22 @@ def _blocks(run: Run, part: Part) -> list[AnyBlock]:
         *pictures(run, part),
         *criteria(run, part),
     ]
+
+
+def _excitation(part: Part) -> list[AnyBlock]:
+    """Whether the motion could tell the parameters at all, and by what it was judged."""
+    found = part.details.get("excitation")
+    if not isinstance(found, dict) or "verdict" not in found:
+        return []
+    reasons = found.get("reasons")
+    told = [str(reason) for reason in reasons] if isinstance(reasons, list) else []
+    facts = [Fact(label="Verdict", value="; ".join([str(found["verdict"]), *told]))]
+    for key, value in found.items():
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            label, unit = split_unit(key)
+            shown = format_quantity(float(value), unit=unit)
+            facts.append(Fact(label=f"{label[:1].upper()}{label[1:]}", value=shown))
+    return [FactTable(caption="Excitation: could this motion tell them?", facts=facts)]
 
 
 def _comparison(part: Part) -> list[AnyBlock]:

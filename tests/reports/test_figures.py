@@ -111,5 +111,6 @@ def test_histogram_bars_are_as_high_as_their_counts() -> None:
 def test_ticks_are_few_round_and_inside(low: float, span: float, wanted: int) -> None:
     ticks = axis_ticks(low, low + span, wanted)
     assert wanted / 2 - 1 <= len(ticks) <= 2 * wanted
-    assert all(low - 1e-6 * span <= value <= low + span * (1 + 1e-6) for value, _ in ticks)
+    rounding = 1e-6 * span + 4 * float(np.spacing(abs(low) + span))
+    assert all(low - rounding <= value <= low + span + rounding for value, _ in ticks)
     assert len({text for _, text in ticks}) == len(ticks)

@@ -12,7 +12,7 @@ from seamlog.reports import page
 from seamlog.reports.content import Banner, Notice, Text
 from seamlog.reports.curves import Plot
 from seamlog.reports.report import Report
-from seamlog.results import Criterion, Figure, Input, Part, Results, Verdict
+from seamlog.results import Criterion, Figure, Input, Part, Place, Results, Verdict
 from tests.reports.sample_results import write_sample
 
 
@@ -56,11 +56,20 @@ def test_the_date_is_the_end_of_the_weld_or_unknown(tmp_path: Path, sample: Resu
 def test_a_missing_part_is_named(tmp_path: Path) -> None:
     document = _report(_one_part(tmp_path / "r")).document()
     for section in document.sections:
-        if section.name in ("bead", "join", "seam", "replay", "identification", "health"):
+        if section.name in (
+            "bead",
+            "quality",
+            "surface",
+            "join",
+            "seam",
+            "replay",
+            "identification",
+            "health",
+        ):
             assert isinstance(section.blocks[0], Notice)
             assert "not recorded" in section.blocks[0].text
     text = (tmp_path / "x.html", page.render(document))[1]
-    assert text.count("(not recorded)") == 6
+    assert text.count("(not recorded)") == 8
 
 
 @pytest.mark.parametrize(
@@ -162,3 +171,43 @@ def test_a_section_of_ones_own(sample: Results) -> None:
     document = report.document()
     assert document.sections[-1].title == "Notes"
     assert "Torch nozzle was changed." in page.render(document)
+
+
+def test_excitation_calibration_and_findings_are_told(tmp_path: Path) -> None:
+    results = Results.create(tmp_path / "r")
+    excitation = {"verdict": "poor", "reasons": ["one direction only"], "forward_share": 0.98}
+    results.write(
+        Part(part="identification", title="I", details={"excitation": excitation}),
+    )
+    calibration = {"kind": "plane", "date": "2025-12-22", "source": "board", "residual_mm": 0.021}
+    width = Criterion(
+        name="w", label="width", value=8.1, upper=7, verdict="FAIL", place=Place(s_mm=120.0)
+    )
+    bead = Part(part="bead", title="B", criteria=[width], details={"calibration": calibration})
+    results.write(bead)
+    results.write(Part(part="tracking", title="T", details={"end_ns": 1_767_225_600_000_000_000}))
+    text = page.render(_report(results).document())
+    assert "poor; one direction only" in text and "0.98" in text
+    assert "plane, board, residual 0.021 mm" in text
+    assert "10 days (of 2025-12-22)" in text
+    assert "width: 8.1 (limit at most 7) (s = 120.0 mm on the photo)" in text
+
+
+def test_a_table_over_a_quantity_of_its_own_is_a_curve(tmp_path: Path) -> None:
+    results = Results.create(tmp_path / "r")
+    table = {"speed_mm_s": np.linspace(-9.0, 9.0, 12), "mean_residual": np.arange(12.0)}
+    part = Part(part="identification", title="I")
+    results.write(part, tables={"by_speed": (table, {"speed_mm_s": "mm/s", "mean_residual": "N"})})
+    blocks = [b for s in _report(results).document().sections for b in s.blocks]
+    (plot,) = [block for block in blocks if isinstance(block, Plot)]
+    assert (plot.kind, plot.x_label, plot.x_unit) == ("curve_plot", "speed", "mm/s")
+
+
+def test_one_reason_stands_once_and_the_unknown_before_the_record(tmp_path: Path) -> None:
+    results = Results.create(tmp_path / "r")
+    width = Criterion(name="w", label="width", value=8.1, upper=7, verdict="FAIL")
+    for name in ("bead", "quality", "x_ray"):
+        results.write(Part(part=name, title=name, verdict="FAIL", criteria=[width]))
+    assert len(_banner(_report(results)).reasons) == 1
+    names = [section.name for section in _report(results).document().sections]
+    assert names.index("x_ray") < names.index("record") < names.index("provenance")
