@@ -10,7 +10,7 @@ from seamlog.results import Input, Part, input_of
 from .bead.assess import AssessedPhoto, assess_photos
 from .bead.part import BeadConfig, Pictures, Tables
 from .bead.sources import attached_photos, photo_files
-from .inspection import InspectionSettings, inspect_photos
+from .inspection import InspectionSettings, inspect_photos, stitched
 from .join_part import join_part, no_join
 from .quality.part import QualityConfig
 
@@ -40,6 +40,9 @@ def bead_and_join(
     only = welds[0].number if len(welds) == 1 else None
     assessed = assess_photos(sources, start, settled, only)
     inputs = [input_of(path) for path in session.paths]
+    whole = stitched(assessed, settled) if len(welds) == 1 else ""
+    if isinstance(whole, AssessedPhoto):
+        assessed = [*assessed, whole]
     parts = inspect_photos(assessed, InspectionSettings(quality))
     if not welds:
         return [*parts, (no_join("the session has no weld", None, inputs), {}, {})]
@@ -64,4 +67,5 @@ def _joined(
     measured = [item.result for item in chosen if item.result is not None]
     if not measured:
         return no_join(f"no width was measured: {chosen[0].refusal}", weld, inputs), {}
-    return join_part(session, weld, measured[0].measurement, config, inputs)
+    whole = measured[-1] if measured[-1].plane is None else measured[0]
+    return join_part(session, weld, whole.measurement, config, inputs)

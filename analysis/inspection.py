@@ -3,11 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from seamlog.errors import EvidenceError
 from seamlog.results import Figure, Part, Verdict
 
 from .bead.assess import AssessedPhoto
 from .bead.image import Photo
-from .bead.part import Pictures, Tables
+from .bead.part import BeadConfig, BeadResult, Pictures, Tables, bead_part
+from .bead.stitch import stitch
+from .bead.uniformity import uniformity
 from .quality.part import QualityConfig, quality_part
 from .surface.part import surface_part
 
@@ -22,6 +25,29 @@ class InspectionSettings:
     before: Photo | None = None
     heights: tuple[Figure, ...] = ()
     """Figures of a laser stripe, where the log has one."""
+
+
+def stitched(assessed: Sequence[AssessedPhoto], config: BeadConfig) -> AssessedPhoto | str:
+    """Several photos as one bead, its part behind theirs; or why they are not stitched."""
+    results = [item.result for item in assessed if item.result is not None]
+    if len(results) < 2 or len(results) < len(assessed):
+        return "not all photos could be measured" if len(assessed) > 1 else ""
+    try:
+        found = stitch([r.photo for r in results], [r.measurement for r in results])
+    except EvidenceError as error:
+        return str(error)
+    whole = BeadResult(found.photo, found.measurement, uniformity(found.measurement))
+    inputs = [item for each in assessed for item in each.part.inputs]
+    unique = list({item.sha256: item for item in inputs}.values())
+    first = assessed[0].part
+    part, tables, pictures = bead_part(whole, unique, config, len(assessed) + 1, first.weld)
+    names = [assessed[k].name for k in found.order]
+    places = zip(names, found.first_station, found.shift_mm, strict=True)
+    part.details["stitched"] = [
+        {"photo": name, "first_station": first_station, "s_mm": shift}
+        for name, first_station, shift in places
+    ]
+    return AssessedPhoto(part, tables, pictures, whole, None, found.photo.name)
 
 
 def inspect_photos(

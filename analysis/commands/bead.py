@@ -9,6 +9,9 @@ from seamlog.command import command, config_options, force_option, group, output
 from seamlog.errors import EvidenceError, OutputExists, UsageError
 from seamlog.outcome import Ending, Outcome
 
+from .bead_grr import grr
+from .bead_synth import synth
+
 if TYPE_CHECKING:
     from seamlog.analysis.bead.assess import AssessedPhoto
     from seamlog.analysis.inspection import Inspected
@@ -61,10 +64,10 @@ def measure(
     Limits come from the sections [bead] and [quality] of the configuration. Refuses (exit code 6)
     a photo in which no bead can be told from the plate; the results, if asked for, then say why.
     """
-    from seamlog.analysis.bead.assess import assess_photos
+    from seamlog.analysis.bead.assess import AssessedPhoto, assess_photos
     from seamlog.analysis.bead.image import load_photo
     from seamlog.analysis.bead.part import BeadConfig
-    from seamlog.analysis.inspection import InspectionSettings, inspect_photos
+    from seamlog.analysis.inspection import InspectionSettings, inspect_photos, stitched
     from seamlog.analysis.quality.part import QualityConfig
     from seamlog.config import load_config
 
@@ -74,15 +77,19 @@ def measure(
     earlier = load_photo(before) if before else None
     sources = _sources(photos, session, calibration)
     assessed = assess_photos(sources, start, settled, weld)
+    whole = stitched(assessed, settled)
+    if isinstance(whole, AssessedPhoto):
+        assessed = [*assessed, whole]
     parts = inspect_photos(assessed, InspectionSettings(quality, earlier))
     if output is not None:
         _write(output, parts)
     if len(assessed) == 1 and assessed[0].refusal is not None:
         raise assessed[0].refusal
-    return _outcome(assessed, parts, output)
+    return _outcome(assessed, parts, output, whole if isinstance(whole, str) else "")
 
 
-bead.add_command(measure)
+for _act in (measure, grr, synth):
+    bead.add_command(_act)
 
 
 def _check_output(output: Path | None, force: bool) -> None:
@@ -130,16 +137,23 @@ def _write_csv(path: Path, columns: "Columns") -> None:
 
 
 def _outcome(
-    assessed: list["AssessedPhoto"], parts: list["Inspected"], output: Path | None
+    assessed: list["AssessedPhoto"], parts: list["Inspected"], output: Path | None, apart: str
 ) -> Outcome:
+    """`apart` says why several photos were not stitched into one bead."""
     documents = [_document(item, parts) for item in assessed]
     lines = [line for document in documents for line in _lines(document)]
+    if apart:
+        lines.append(f"Not stitched into one bead: {apart}")
     if output is not None:
         lines.append(f"Results: {output}")
     failed = any(document["verdict"] == "FAIL" for document in documents)
     refused = any(item.refusal is not None for item in assessed)
     ending = Ending.FINDING if failed else Ending.BATCH_FAILED if refused else Ending.PASS
-    document = {"photos": documents, "results": str(output) if output else None}
+    document = {
+        "photos": documents,
+        "not_stitched": apart,
+        "results": str(output) if output else None,
+    }
     return Outcome("seamlog.bead.measure", "\n".join(lines), document, ending)
 
 

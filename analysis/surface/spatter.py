@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from seamlog.analysis.bead.image import Photo
 from seamlog.analysis.bead.measurement import BeadMeasurement
+from seamlog.analysis.bead.overlap import match_photos
 from seamlog.analysis.bead.plane import Plane, Points
 from seamlog.errors import EvidenceError
 
@@ -31,7 +32,6 @@ REACH = 4.0
 _MARGIN = 0.03
 _SAME = 0.5
 """Part of a blob's contrast that a mark has on the photo from before if it was there already."""
-_FEWEST_MATCHES = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,31 +159,13 @@ def _contrast(light: Grid, x: float, y: float, radius: float) -> float:
 
 
 def _registered(photo: Photo, before: Photo) -> Grid:
-    """Lightness of the photo from before, over this one: by features that both show."""
-    now, then = (np.ascontiguousarray(each.opponent()[..., 0]) for each in (photo, before))
-    shrink = min(1.0, 1600 / max(photo.width_px, photo.height_px))
-    small = [
-        np.clip(cv2.resize(each, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA), 0, 255)
-        for each in (now, then)
-    ]
-    finder = cv2.SIFT_create(4000)  # type: ignore[attr-defined]
-    (keys_now, looks_now), (keys_then, looks_then) = (
-        finder.detectAndCompute(np.asarray(each, dtype=np.uint8), None) for each in small
-    )
-    pairs = []
-    if looks_now is not None and looks_then is not None and len(looks_now) > 1:
-        both = cv2.BFMatcher().knnMatch(looks_then, looks_now, k=2)
-        pairs = [m for m, *rest in both if rest and m.distance < 0.75 * rest[0].distance]
-    matrix, agreed = None, 0
-    if len(pairs) >= _FEWEST_MATCHES:
-        source = np.array([keys_then[m.queryIdx].pt for m in pairs]) / shrink
-        target = np.array([keys_now[m.trainIdx].pt for m in pairs]) / shrink
-        matrix, inliers = cv2.findHomography(source, target, cv2.RANSAC, 3.0)
-        agreed = int(np.sum(inliers)) if matrix is not None else 0
-    if matrix is None or agreed < _FEWEST_MATCHES:
+    """Lightness of the photo from before, over this one: by marks that both show."""
+    matrix = match_photos(before, photo)
+    if matrix is None:
         raise EvidenceError(
             f"{before.name} cannot be laid over {photo.name}: they share too few marks; take both "
             "from the same place"
         )
+    earlier = np.ascontiguousarray(before.opponent()[..., 0])
     size = (photo.width_px, photo.height_px)
-    return np.asarray(cv2.warpPerspective(then, matrix, size, borderMode=cv2.BORDER_REPLICATE))
+    return np.asarray(cv2.warpPerspective(earlier, matrix, size, borderMode=cv2.BORDER_REPLICATE))
