@@ -30,3 +30,9 @@ def spinner(label: str) -> Iterator[None]:
 
     with Console(stderr=True).status(label):
         yield
+
+
+def tell(line: str) -> None:
+    """Say something while a command runs, on stderr."""
+    sys.stderr.write(line + "\n")
+    sys.stderr.flush()

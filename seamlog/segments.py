@@ -12,7 +12,10 @@ RECORDING = "seamlog.recording"
 """Metadata record of every session file: `id` of the recording, `index` of the file from 1."""
 PROBLEMS = "seamlog.problems"
 """Metadata record of a copy: what was missing or damaged in the session that was copied."""
-_SEGMENT = re.compile(r"(?P<stem>.+?)(?:\.\d{4,})?\.mcap")
+_SEGMENT = re.compile(r"(?P<stem>.+?)(?:\.\d{4,})?\.mcap(?:\.part)?")
+
+_RINGS = re.compile(r"/dev/shm/seamlog-\d+/[0-9a-f]{32}")
+"""Where the rings of a recording are, as its metadata says; no other path is touched."""
 
 
 def segment_path(first: Path, number: int) -> Path:
@@ -26,10 +29,13 @@ def find_segments(path: str | Path | Sequence[str | Path], limits: Limits) -> li
         return _ordered([McapFile(Path(item), limits) for item in path], "the list")
     path = Path(path)
     if path.is_dir():
-        inside = sorted(path.glob("*.mcap"))
+        inside = sorted(path.glob("*.mcap")) or sorted(path.glob("*.mcap.part"))
         if not inside:
             raise SessionError(f"{path} is a folder without an .mcap file; name a session file")
         return _ordered([McapFile(item, limits) for item in inside], str(path))
+    unfinished = path.with_name(path.name + ".part")
+    if not path.exists() and unfinished.exists():
+        path = unfinished
     first = McapFile(path, limits)
     if _identity(first)[0] is None:
         return [first]
@@ -41,12 +47,45 @@ def _siblings(path: Path) -> list[Path]:
     match = _SEGMENT.fullmatch(path.name)
     if match is None:
         return []
-    found = (item for item in path.parent.iterdir() if item != path)
+    found = [item for item in sorted(path.parent.iterdir()) if _is_stored(item)]
     return [
         item
-        for item in sorted(found)
-        if (other := _SEGMENT.fullmatch(item.name)) and other["stem"] == match["stem"]
+        for item in found
+        if item != path
+        and (other := _SEGMENT.fullmatch(item.name))
+        and other["stem"] == match["stem"]
     ]
+
+
+def _is_stored(path: Path) -> bool:
+    """Not the unfinished name of a file that is finished beside it, nor one just begun."""
+    if path.suffix != ".part":
+        return True
+    return not path.with_suffix("").exists() and path.stat().st_size > 0
+
+
+def grown_segments(files: Sequence[McapFile], limits: Limits) -> list[McapFile] | None:
+    """The files of a session that is being recorded as they are now; None if nothing has changed.
+
+    Files that are as they were stay open and are the same objects; the others are closed.
+    """
+    known = {file.path: file for file in files}
+    first = files[0].path
+    there = [path for path in (first, *_siblings(first)) if path.exists() and _is_stored(path)]
+    changed = [path for path in there if _size(known.get(path)) != path.stat().st_size]
+    if not changed and all(path in there for path in known):
+        return None
+    recording = _identity(files[0])[0]
+    opened = [other for path in changed if (other := _opened(path, files[0], limits))]
+    same = [file for path, file in known.items() if path in there and path not in changed]
+    mine = [file for file in opened if _identity(file)[0] == recording]
+    for file in {*files, *opened} - {*same, *mine}:
+        file.close()
+    return _ordered([*same, *mine], str(first))
+
+
+def _size(file: McapFile | None) -> int:
+    return -1 if file is None else file.source.size
 
 
 def _opened(path: Path, first: McapFile, limits: Limits) -> McapFile | None:
@@ -101,3 +140,20 @@ def _mixture(named: list[tuple[str | None, int]]) -> str:
         return "files of different recordings"
     repeated = len(set(named)) < len(named)
     return "a recording more than once" if repeated and named[0][0] is not None else ""
+
+
+def is_live(ring_path: str) -> bool:
+    """True while a process of the recording with these rings lives, on this machine."""
+    if not _RINGS.fullmatch(ring_path):
+        return False
+    try:
+        import fcntl
+
+        with Path(ring_path, "lock").open("rb") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except OSError:
+                return True
+    except (ImportError, OSError):
+        return False
+    return False

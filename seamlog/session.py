@@ -22,7 +22,7 @@ from seamlog.limits import LIMITS, Limits
 from seamlog.mcap.attachments import Attachments
 from seamlog.mcap.columns import LOG_TIME, Columns, by_log_time
 from seamlog.mcap.file import ENDLESS, McapFile
-from seamlog.segments import PROBLEMS, find_segments
+from seamlog.segments import PROBLEMS, RECORDING, find_segments, grown_segments, is_live
 from seamlog.session_info import ChannelInfo, SessionInfo, session_info
 from seamlog.welds import Weld, welds_of
 
@@ -179,6 +179,25 @@ class Session:
     def metadata(self) -> Mapping[str, dict[str, str]]:
         """Metadata records by name; of two with one name the later one counts."""
         return {name: values for file in self.files for name, values in file.metadata}
+
+    def grow(self) -> bool:
+        """Take in what was recorded meanwhile, in its last file and in new ones; False if nothing.
+
+        Columns and windows of before stay as they were; `files` are opened anew where they grew.
+        """
+        found = grown_segments(self.files, self.limits)
+        if found is None:
+            return False
+        self.files = tuple(found)
+        for name in [*vars(self)]:
+            if isinstance(getattr(type(self), name, None), cached_property):
+                delattr(self, name)
+        return True
+
+    @property
+    def is_being_recorded(self) -> bool:
+        """The recorder, or the loop that it belongs to, is at work on this machine."""
+        return is_live(self.metadata.get(RECORDING, {}).get("ring_path", ""))
 
     def close(self) -> None:
         """Close the files; windows of this session end with it."""

@@ -1,22 +1,28 @@
 """`seamlog info`: what is in a session, from its summary alone."""
 
+import time
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from seamlog.command import command, session_argument
 from seamlog.outcome import Ending, Outcome
+from seamlog.progress import tell
 
 if TYPE_CHECKING:
     from seamlog.session import ChannelInfo, Session, SessionInfo
 
+_FOLLOW_S = 1.0
 _RIGHT = {2, 3, 4, 5}
 
 
 @command()
 @session_argument
-def info(session: Path) -> Outcome:
+@click.option("--follow", is_flag=True, help="Stay until the recording ends, a line per second.")
+def info(session: Path, follow: bool) -> Outcome:
     """Say what is in SESSION: channels, welds, attachments, and what is missing or damaged.
 
     Reads the summary, not the messages; an unfinished file is walked over. Exit code 1 if
@@ -25,11 +31,33 @@ def info(session: Path) -> Outcome:
     from seamlog.session import open_session
 
     with open_session(session) as opened:
+        if follow:
+            _follow(opened)
         found = opened.info
         document = _document(opened, found)
         text = _text(opened, found)
     ending = Ending.FINDING if found.problems else Ending.PASS
     return Outcome("seamlog.info", text, document, ending)
+
+
+def _follow(session: "Session") -> None:
+    """Say each second what has come, until nobody records any more."""
+    before = 0
+    while True:
+        going_on = session.is_being_recorded
+        if session.grow() or not before:
+            before = _tell_growth(session, before)
+        if not going_on:
+            return
+        time.sleep(_FOLLOW_S)
+
+
+def _tell_growth(session: "Session", before: int) -> int:
+    found = session.info
+    size = f"{_size(found.size_bytes)} in {len(session.paths)} file(s)"
+    more = found.message_count - before
+    tell(f"{found.duration_s:9.1f} s  {found.message_count:>10} messages (+{more})  {size}")
+    return found.message_count
 
 
 def _document(session: "Session", found: "SessionInfo") -> dict[str, Any]:
