@@ -114,6 +114,10 @@ class _Recovery:
                 self._count(accounts)
                 self._sign(file)
                 file.finish()
+            if not file.counts and not self._index.attachments:
+                raise SessionError(
+                    f"{result.source} holds no message that is whole; there is nothing to recover"
+                )
             check_by_second_reader(partial, file.counts)
         if self._rings is not None:
             self._rings.remove()

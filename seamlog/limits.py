@@ -14,6 +14,9 @@ class Limits:
     image_pixels: int = 120_000_000
     """Width times height, taken from the picture's header before it is decoded."""
     summary_bytes: int = 256 << 20
+    expansion: int = 200
+    """Bytes that all chunks may unpack to per byte of the file, once they are more than
+    `chunk_bytes`: logs of machines come to 2 to 50."""
 
 
 LIMITS = Limits()

@@ -24,7 +24,7 @@ def doctor(session: Path) -> Outcome:
     from seamlog.session import open_session
 
     with open_session(session) as opened:
-        findings = list(few(_examine(opened)))
+        findings = list(few(examine(opened)))
         checked = {
             "paths": [str(path) for path in opened.paths],
             "size_bytes": sum(file.source.size for file in opened.files),
@@ -39,7 +39,8 @@ def doctor(session: Path) -> Outcome:
     return Outcome("seamlog.doctor", text, document, Ending.PASS if is_well else Ending.FINDING)
 
 
-def _examine(session: "Session") -> "Iterator[Finding]":
+def examine(session: "Session") -> "Iterator[Finding]":
+    """All that is wrong with an open session, file by file, then across them."""
     from seamlog.accounts_check import iter_account_findings
     from seamlog.mcap.channel_course import Courses
     from seamlog.mcap.examine import Examination

@@ -4,6 +4,7 @@ import struct
 
 from zlib_ng.zlib_ng import crc32
 
+from seamlog.errors import LimitExceeded
 from seamlog.limits import Limits
 from seamlog.mcap import records
 from seamlog.mcap.compression import decompress
@@ -26,6 +27,16 @@ def read_chunk(source: FileSource, entry: ChunkEntry, limits: Limits) -> memoryv
     return memoryview(_unpacked(source, entry, limits))
 
 
+def check_expansion(source: FileSource, unpacked_bytes: int, limits: Limits) -> None:
+    """Raise `LimitExceeded` if the chunks of a file come to more than any log does."""
+    if unpacked_bytes > max(limits.chunk_bytes, limits.expansion * source.size):
+        raise LimitExceeded(
+            f"{source.path}: its chunks unpack to {unpacked_bytes} bytes or more, over "
+            f"{limits.expansion} times the file (limit expansion): this is no log but a bomb; do "
+            "not trust where it comes from"
+        )
+
+
 def _unpacked(source: FileSource, entry: ChunkEntry, limits: Limits) -> memoryview:
     data, at, name = source.data, entry.offset, entry.compression.encode()
     start = at + _HEAD.size + len(name) + 8
@@ -38,7 +49,12 @@ def _unpacked(source: FileSource, entry: ChunkEntry, limits: Limits) -> memoryvi
         raise Malformed("its head is not what the index says")
     if data[at + _HEAD.size : start - 8] != name:
         raise Malformed("its compression is not what the index says")
-    unpacked = decompress(data[start:end], entry.compression, size, limits.chunk_bytes)
+    try:
+        unpacked = decompress(data[start:end], entry.compression, size, limits.chunk_bytes)
+    except LimitExceeded as error:
+        raise LimitExceeded(
+            f"{source.path}: the chunk at byte {at}: {error}; do not trust where it comes from"
+        ) from error
     if crc and crc32(unpacked) != crc:
         raise Malformed("its CRC is wrong")
     source.used(entry.length)

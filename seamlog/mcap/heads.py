@@ -26,15 +26,6 @@ def message_heads(data: memoryview) -> tuple[NDArray[np.int64], NDArray[Any]]:
 
     Raises `Malformed` unless whole records fill `data`.
     """
-    offsets = _offsets(data)
-    array = np.frombuffer(data, np.uint8)
-    if not len(offsets):
-        return offsets, np.empty(0, HEAD)
-    windows = np.lib.stride_tricks.sliding_window_view(array, HEAD.itemsize)
-    return offsets, windows[offsets].reshape(-1).view(HEAD)
-
-
-def _offsets(data: memoryview) -> NDArray[np.int64]:
     at, end, unpack = 0, len(data), records.RECORD_HEAD.unpack_from
     found: list[int] = []
     while at + records.RECORD_HEAD.size <= end:
@@ -44,12 +35,17 @@ def _offsets(data: memoryview) -> NDArray[np.int64]:
             if step < HEAD.itemsize:
                 raise Malformed(f"the message at byte {at} of a chunk has no head")
             if not found and (end - at) % step == 0 and _is_uniform(data, at, step):
-                return np.arange(at, end, step, dtype=np.int64)
+                count = (end - at) // step
+                return np.arange(at, end, step), np.ndarray((count,), HEAD, data, at, (step,))
             found.append(at)
         at += step
     if at != end:
         raise Malformed("its records do not fill it")
-    return np.array(found, np.int64)
+    offsets = np.array(found, np.int64)
+    if not found:
+        return offsets, np.empty(0, HEAD)
+    windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), HEAD.itemsize)
+    return offsets, windows[offsets].reshape(-1).view(HEAD)
 
 
 def _is_uniform(data: memoryview, start: int, step: int) -> bool:

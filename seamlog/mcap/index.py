@@ -8,6 +8,7 @@ from zlib_ng.zlib_ng import crc32
 from seamlog.errors import SessionError
 from seamlog.limits import LIMITS, Limits
 from seamlog.mcap import parsing, records
+from seamlog.mcap.chunks import check_expansion
 from seamlog.mcap.records import (
     AttachmentEntry,
     ChannelRecord,
@@ -145,6 +146,8 @@ def _read_summary(source: FileSource, start: int, index: FileIndex, limits: Limi
     for opcode, offset, length in walk(data, start, end):
         index.learn(opcode, data[offset + records.RECORD_HEAD.size : offset + length])
     _check_entries(source, index.chunks)
+    most = limits.chunk_bytes
+    check_expansion(source, sum(min(row.uncompressed_size, most) for row in index.chunks), limits)
 
 
 def _check_entries(source: FileSource, chunks: list[ChunkEntry]) -> None:

@@ -8,13 +8,16 @@ walk goes on at the next record that its own CRC proves.
 import struct
 from collections.abc import Mapping
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seamlog.errors import SessionError
 from seamlog.limits import Limits
 from seamlog.mcap import parsing, records
-from seamlog.mcap.chunks import BARE, read_chunk
+from seamlog.mcap.chunks import BARE, check_expansion, read_chunk
+from seamlog.mcap.heads import message_heads
 from seamlog.mcap.index import FileIndex, read_header, walk
 from seamlog.mcap.records import ChunkEntry, Malformed
 from seamlog.mcap.salvage import Salvage, attachment_end, proved_summary
@@ -100,6 +103,7 @@ class _Scanner:
         self._span: list[int] = []
         self._counts: dict[int, int] = {}
         self._bare: list[int] = []
+        self._unpacked = 0
 
     def run(self) -> None:
         at: int | None = len(records.MAGIC)
@@ -176,6 +180,8 @@ class _Scanner:
         self._close_bare(offset)
         if opcode == records.CHUNK:
             self._open = _entry(offset, length, content)
+            self._unpacked += min(self._open.uncompressed_size, self.limits.chunk_bytes)
+            check_expansion(self.source, self._unpacked, self.limits)
         elif opcode == records.ATTACHMENT:
             self.index.attachments.append(_attachment(offset, length, content))
         elif opcode == records.METADATA:
@@ -252,23 +258,25 @@ class _Scanner:
     def _learn(self, entry: ChunkEntry) -> ChunkEntry:
         """Read a chunk's channels, counts and times, where nothing else tells them for sure."""
         data = read_chunk(self.source, entry, self.limits)
-        counts: dict[int, int] = {}
-        start, end = 1 << 64, 0
-        for opcode, offset, length in walk(data, 0, len(data)):
-            if opcode == records.MESSAGE:
-                if length < 31:
-                    raise Malformed("a message has no head")
-                channel_id = int.from_bytes(data[offset + _HEAD : offset + _HEAD + 2], "little")
-                counts[channel_id] = counts.get(channel_id, 0) + 1
-                log_time = int.from_bytes(data[offset + 15 : offset + 23], "little")
-                start, end = min(start, log_time), max(end, log_time)
-            else:
+        offsets, heads = message_heads(data)
+        self._learn_records(data, offsets, heads)
+        numbers, counts = np.unique(heads["channel"], return_counts=True)
+        self._counts = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
+        if self._counts:
+            times = heads["log_time"]
+            entry = entry._replace(start_ns=int(times.min()), end_ns=int(times.max()))
+        places = {number: entry.index_offsets.get(number, 0) for number in self._counts}
+        return entry._replace(index_offsets=places)
+
+    def _learn_records(
+        self, data: memoryview, offsets: NDArray[np.int64], heads: NDArray[Any]
+    ) -> None:
+        """Take in what stands between the messages."""
+        ends = np.append(0, offsets + heads["length"].astype(np.int64) + _HEAD)
+        starts = np.append(offsets, len(data))
+        for gap in np.flatnonzero(ends != starts).tolist():
+            for opcode, offset, length in walk(data, int(ends[gap]), int(starts[gap])):
                 self.index.learn(opcode, data[offset + _HEAD : offset + length])
-        self._counts = counts
-        offsets = {number: entry.index_offsets.get(number, 0) for number in counts}
-        if counts:
-            entry = entry._replace(start_ns=start, end_ns=end)
-        return entry._replace(index_offsets=offsets)
 
     def _note(self, entry: ChunkEntry, counts: Mapping[int, int]) -> None:
         self.index.chunks.append(entry)
