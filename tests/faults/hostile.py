@@ -82,14 +82,16 @@ def statistics_of_everything(path: Path) -> None:
 
 
 @hostile
-def index_of_one_chunk_a_million_times(path: Path) -> None:
+def index_of_one_chunk_many_times(path: Path) -> None:
     write_live(path)
     data = path.read_bytes()
     end = len(data) - len(records.MAGIC)
     (start,) = struct.unpack_from("<Q", data, end - 20)
-    at = data.index(bytes([records.CHUNK_INDEX]), start)
+    at = start
+    while data[at] != records.CHUNK_INDEX:
+        at += records.RECORD_HEAD.unpack_from(data, at)[1] + 9
     length = records.RECORD_HEAD.unpack_from(data, at)[1] + 9
-    summary = data[start : end - 28 - 1] + data[at : at + length] * 200_000
+    summary = data[start : end - records.FOOTER_BYTES] + data[at : at + length] * 200_000
     summary += records.footer(start, 0)
     path.write_bytes(data[:start] + summary + struct.pack("<I", crc32(summary)) + records.MAGIC)
 
