@@ -1,6 +1,7 @@
-"""`seamlog info`: what is in a session, from its summary alone."""
+"""`seamlog info`: what is in a session, from its summary and message indexes."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,9 +15,10 @@ from seamlog.progress import tell
 
 if TYPE_CHECKING:
     from seamlog.session import ChannelInfo, Session, SessionInfo
+    from seamlog.session_timing import Account, Timing
 
 _FOLLOW_S = 1.0
-_RIGHT = {2, 3, 4, 5}
+_RIGHT = set(range(2, 12))
 
 
 @command()
@@ -25,17 +27,19 @@ _RIGHT = {2, 3, 4, 5}
 def info(session: Path, follow: bool) -> Outcome:
     """Say what is in SESSION: channels, welds, attachments, and what is missing or damaged.
 
-    Reads the summary, not the messages; an unfinished file is walked over. Exit code 1 if
-    something is missing or damaged.
+    Rates, gaps and jitter come from log times. Reads the summary and the message indexes, not the
+    messages; an unfinished file is walked over. Exit code 1 if something is missing or damaged.
     """
     from seamlog.session import open_session
+    from seamlog.session_timing import accounts, timing_of_topics
 
     with open_session(session) as opened:
         if follow:
             _follow(opened)
+        timing, account = timing_of_topics(opened), accounts(opened)
         found = opened.info
-        document = _document(opened, found)
-        text = _text(opened, found)
+        document = _document(opened, found, timing, account)
+        text = _text(opened, found, timing, account)
     ending = Ending.FINDING if found.problems else Ending.PASS
     return Outcome("seamlog.info", text, document, ending)
 
@@ -60,7 +64,12 @@ def _tell_growth(session: "Session", before: int) -> int:
     return found.message_count
 
 
-def _document(session: "Session", found: "SessionInfo") -> dict[str, Any]:
+def _document(
+    session: "Session",
+    found: "SessionInfo",
+    timing: Mapping[str, "Timing"],
+    account: Mapping[str, "Account"],
+) -> dict[str, Any]:
     document = asdict(found) | {
         "paths": [str(path) for path in session.paths],
         "duration_s": found.duration_s,
@@ -70,19 +79,46 @@ def _document(session: "Session", found: "SessionInfo") -> dict[str, Any]:
         ],
     }
     document["channels"] = [
-        asdict(channel) | {"rate_hz": channel.rate_hz} for channel in found.channels.values()
+        asdict(channel) | _figures(channel, timing, account) for channel in found.channels.values()
     ]
+    document["complete"] = _completeness(found, account)
     return document
+
+
+def _figures(
+    channel: "ChannelInfo", timing: Mapping[str, "Timing"], account: Mapping[str, "Account"]
+) -> dict[str, Any]:
+    found: dict[str, Any] = {"rate_hz": channel.rate_hz}
+    if channel.topic in timing:
+        found |= asdict(timing[channel.topic])
+    if channel.topic in account:
+        found["account"] = asdict(account[channel.topic])
+    return found
+
+
+def _completeness(found: "SessionInfo", account: Mapping[str, "Account"]) -> bool | None:
+    """Whether every message that was offered is there; None if nobody counted."""
+    if found.problems:
+        return False
+    if not account:
+        return None
+    return not any(row.dropped or row.refused or row.lost for row in account.values())
 
 
 def _attachments(session: "Session") -> list[tuple[str, Any]]:
     return [(name, session.attachments.entry(name)) for name in session.attachments]
 
 
-def _text(session: "Session", found: "SessionInfo") -> str:
+def _text(
+    session: "Session",
+    found: "SessionInfo",
+    timing: Mapping[str, "Timing"],
+    account: Mapping[str, "Account"],
+) -> str:
     return "\n\n".join(filter(None, (
         _head(session, found),
-        _channels(found),
+        _channels(found, timing, account),
+        _verdict(found, account),
         _welds(found),
         _listed("attachments", [
             f"{name}  {row.media_type}  {_size(row.data_size)}"
@@ -106,22 +142,69 @@ def _head(session: "Session", found: "SessionInfo") -> str:
     return "\n".join(lines)
 
 
-def _channels(found: "SessionInfo") -> str:
+_HEAD = (
+    "topic", "message", "count", "rate Hz", "from s", "to s",
+    "jitter ms", "gaps", "longest s", "bytes",
+)  # fmt: skip
+
+
+def _channels(
+    found: "SessionInfo", timing: Mapping[str, "Timing"], account: Mapping[str, "Account"]
+) -> str:
     if not found.channels:
         return ""
-    head = ("topic", "message", "count", "rate Hz", "from s", "to s")
-    rows = [_channel(channel, found.start_ns) for channel in found.channels.values()]
+    rows = [
+        _channel(channel, found.start_ns, timing.get(channel.topic))
+        for channel in found.channels.values()
+    ]
+    head: tuple[str, ...] = _HEAD
+    if account:
+        head = (*_HEAD, "dropped")
+        rows = [(*row, _dropped(account.get(row[0]))) for row in rows]
     return _aligned([head, *rows])
 
 
-def _channel(channel: "ChannelInfo", start_ns: int) -> tuple[str, ...]:
-    rate = "" if channel.rate_hz is None else f"{channel.rate_hz:.4g}"
-    span = ["" if t is None else f"{(t - start_ns) / 1e9:.3f}" for t in _span(channel)]
-    return (channel.topic, channel.schema or channel.encoding, str(channel.count), rate, *span)
+def _channel(channel: "ChannelInfo", start_ns: int, timing: "Timing | None") -> tuple[str, ...]:
+    name = channel.schema or channel.encoding
+    if timing is None:
+        return (channel.topic, name, str(channel.count), *[""] * (len(_HEAD) - 3))
+    # a message now and then has no period that it could miss
+    steady = timing.gaps is not None and timing.gaps * 10 < channel.count
+    return (
+        channel.topic,
+        name,
+        str(channel.count),
+        _shown(timing.rate_hz, "{:.4g}"),
+        _seconds(timing.start_ns, start_ns),
+        _seconds(timing.end_ns, start_ns),
+        _shown(timing.jitter_s, "{:.3g}", 1e3) if steady else "",
+        str(timing.gaps) if steady else "",
+        _shown(timing.longest_gap_s, "{:.4g}") if steady else "",
+        _size(timing.size_bytes),
+    )
 
 
-def _span(channel: "ChannelInfo") -> tuple[int | None, int | None]:
-    return channel.start_ns, channel.end_ns
+def _shown(value: float | None, form: str, scale: float = 1.0) -> str:
+    return "" if value is None else form.format(value * scale)
+
+
+def _seconds(time_ns: int | None, start_ns: int) -> str:
+    return "" if time_ns is None else f"{(time_ns - start_ns) / 1e9:.3f}"
+
+
+def _dropped(account: "Account | None") -> str:
+    return "" if account is None else str(account.dropped + account.refused + account.lost)
+
+
+def _verdict(found: "SessionInfo", account: Mapping[str, "Account"]) -> str:
+    if not account:
+        return ""
+    if _completeness(found, account):
+        return "complete: every message that was offered is in the session"
+    lost = sum(row.dropped + row.refused + row.lost for row in account.values())
+    return (
+        f"NOT complete: {lost} messages dropped, refused or lost; problems: {len(found.problems)}"
+    )
 
 
 def _welds(found: "SessionInfo") -> str:

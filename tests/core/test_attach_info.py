@@ -2,14 +2,18 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 import seamlog
+from seamlog import messages
+from seamlog.channels import CHANNELS
 from seamlog.cli import run
-from tests.core.scenarios import assert_same, picture, write_live
+from seamlog.mcap.batch import BatchWriter
+from tests.core.scenarios import SCENARIOS, START_NS, assert_same, picture, write_live
 
 PNG = bytes(cv2.imencode(".png", np.zeros((4, 5), np.uint8))[1])
 PLANE = {
@@ -122,3 +126,46 @@ def test_a_damaged_session_stays_as_it_was(live: Path, tmp_path: Path) -> None:
         live.write_bytes(damaged)
         assert run(["attach", str(live), str(tmp_path / "p.png")]) == 3
         assert live.read_bytes() == damaged
+
+
+def recorder_row(topic: str, dropped: int) -> tuple[Any, ...]:
+    row = {"stamp_ns": START_NS, "topic": topic, "offered": 100, "dropped": dropped}
+    return tuple(row.get(name, 0) for name in CHANNELS["/seamlog/recorder"].field_names)
+
+
+@pytest.mark.parametrize("dropped", [0, 7])
+def test_info_tells_rates_gaps_jitter_bytes_and_drops(
+    tmp_path: Path, dropped: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """99 steps of 10 ms, every other one 1 ms late, and one gap of half a second."""
+    status = CHANNELS["/seamlog/recorder"]
+    stamps = START_NS + np.arange(100) * 10_000_000 + np.arange(100) % 2 * 1_000_000
+    stamps[60:] += 500_000_000
+    columns = {"stamp_ns": stamps, "position_m": np.zeros(100), "velocity_m_s": np.zeros(100)}
+    with BatchWriter(tmp_path / "x.mcap") as writer:
+        writer.write("/table/encoder", columns)
+        row = messages.encode(status, recorder_row("/table/encoder", dropped))
+        writer.write_payloads(status.topic, status, [row], [int(stamps[-1])])
+    assert run(["info", str(tmp_path / "x.mcap"), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    encoder = next(c for c in document["channels"] if c["topic"] == "/table/encoder")
+    assert encoder["gaps"] == 1
+    assert encoder["longest_gap_s"] == pytest.approx(0.509, abs=1e-3)
+    assert encoder["jitter_s"] == pytest.approx(0.001, rel=0.01)
+    assert encoder["size_bytes"] >= 100 * 59
+    assert encoder["account"]["dropped"] == dropped
+    assert document["complete"] is (dropped == 0)
+    assert run(["info", str(tmp_path / "x.mcap")]) == 0
+    assert ("NOT complete: 7" in capsys.readouterr().out) == bool(dropped)
+
+
+@pytest.mark.parametrize("name", [name for name in SCENARIOS if name.startswith("foreign")])
+def test_info_counts_bytes_of_foreign_files(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    expected = SCENARIOS[name](tmp_path / "x.mcap")
+    assert run(["info", str(tmp_path / "x.mcap"), "--json"]) == 0
+    rows = {c["topic"]: c for c in json.loads(capsys.readouterr().out)["channels"]}
+    for topic in expected:
+        assert rows[topic]["size_bytes"] >= 31 * rows[topic]["count"]
+        assert rows[topic]["rate_hz"] == pytest.approx(25.0)
