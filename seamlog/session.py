@@ -20,8 +20,10 @@ from seamlog.channels import CHANNELS
 from seamlog.errors import ChannelMissing, SessionError, UnknownName
 from seamlog.limits import LIMITS, Limits
 from seamlog.mcap.attachments import Attachments
-from seamlog.mcap.columns import LOG_TIME, Columns, by_log_time
+from seamlog.mcap.columns import LOG_TIME, STAMP, Columns, by_log_time
 from seamlog.mcap.file import ENDLESS, McapFile
+from seamlog.mcap.records import ChannelRecord
+from seamlog.migrate import FORMAT, format_of, migrated
 from seamlog.segments import PROBLEMS, RECORDING, find_segments, grown_segments, is_live
 from seamlog.session_info import ChannelInfo, SessionInfo, session_info
 from seamlog.welds import Weld, welds_of
@@ -133,11 +135,20 @@ class Session:
         parts, is_kept = [], False
         for file in self.files:
             for row in file.channels(topic):
-                part = file.columns(row, fields, self.span)
+                part = self._part(file, row, fields)
                 is_kept |= file.kept_order(row, part, self.span)
                 parts.append(part)
         joined = _joined(parts, f"{self.path}: {topic}")
         return joined if is_kept else by_log_time(joined)
+
+    def _part(self, file: McapFile, row: ChannelRecord, fields: Sequence[str] | None) -> Columns:
+        recording = next((values for name, values in file.metadata if name == RECORDING), {})
+        version = format_of(recording, str(file.path))
+        if version == FORMAT:
+            return file.columns(row, fields, self.span)
+        whole = migrated(row.topic, file.columns(row, None, self.span), version)
+        wanted = (LOG_TIME, STAMP, *(whole if fields is None else fields))
+        return {name: column for name, column in whole.items() if name in wanted}
 
     def table(self, topic: str) -> "pd.DataFrame":
         """`columns` as a table; an array `values` of n gives columns `values[0]` and so on."""
