@@ -227,7 +227,7 @@ CHANNELS: dict[str, Channel] = {channel.topic: channel for channel in _TABLE}
 
 
 def markdown_table() -> str:
-    """The table as Markdown, for docs/format.md."""
+    """The table as Markdown, for docs/channels.md."""
     lines = ["| topic | message | fields (unit) | rate Hz | meaning |", "|---|---|---|---|---|"]
     for channel in CHANNELS.values():
         fields = ", ".join(f"{f.name} ({f.unit})" if f.unit else f.name for f in channel.fields)

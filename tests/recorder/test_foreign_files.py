@@ -259,6 +259,12 @@ def test_a_table_without_a_map_says_how_to_get_one(tmp_path: Path, capsys: Any) 
     assert "--guess" in capsys.readouterr().err
 
 
+MAPS = {
+    "servo_cnc_mill/experiment_01.csv": "cnc_axis",
+    "servo_cnc_mill/experiment_04.csv": "cnc_axis",
+    "weld_log/20180309_14_44_27_welder_data.csv": "welder_log",
+    "emps/DATA_EMPS.mat": "emps",
+}
 FILES = [
     "emps/DATA_EMPS.mat", "servo_cnc_mill/experiment_01.csv", "servo_cnc_mill/experiment_04.csv",
     "tdms/Digital_Input.tdms", "tdms/raw_timestamps.tdms",
@@ -285,3 +291,9 @@ def test_real_bags_are_imported_whole(data_dir: Path, tmp_path: Path, name: str)
         assert {c.topic: c.count for c in bag.info.channels.values()} == {
             c.topic: c.count for c in session.info.channels.values()
         }
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_real_files_import_by_the_maps_of_the_examples(data_dir: Path, name: str) -> None:
+    mapping = Path(__file__).parents[2] / "examples" / f"{MAPS[name]}.map.toml"
+    assert run(["import", str(data_dir / name), "--map", str(mapping), "--dry-run"]) == 0
