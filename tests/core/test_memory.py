@@ -21,7 +21,7 @@ PICTURE = 60 << 20
 PICTURES = 70
 LIMIT_KIB = 256 << 10
 READ = """
-import resource, sys
+import sys
 import seamlog
 with seamlog.open_session(sys.argv[1]) as session:
     assert session.info.message_count == {pictures} + 500, session.info.message_count
@@ -29,7 +29,8 @@ with seamlog.open_session(sys.argv[1]) as session:
     frames = session.frames()
     assert len(frames) == {pictures}
     assert sum(len(frames[place].data) for place in range(0, {pictures}, 9)) == 8 * {size}
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+print(status["VmHWM"].split()[0])
 """
 
 
