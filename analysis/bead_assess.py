@@ -68,4 +68,4 @@ def _joined(
     if not measured:
         return no_join(f"no width was measured: {chosen[0].refusal}", weld, inputs), {}
     whole = measured[-1] if measured[-1].plane is None else measured[0]
-    return join_part(session, weld, whole.measurement, config, inputs)
+    return join_part(session, weld, whole.measurement, config, inputs, whole.plane)

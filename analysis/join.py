@@ -1,7 +1,6 @@
 """The join: each station of the bead tied to the moment at which the torch was there.
 
-The bead's start and stop on the photo are tied to arc on and arc off; which end is the start
-somebody has to say. Without that, or where the tie is worse than 5 mm, nothing is joined.
+Where photo and log are not surely tied to each other (`registration`), nothing is joined.
 """
 
 from dataclasses import dataclass
@@ -10,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.errors import ChannelMissing, EvidenceError
+from seamlog.errors import ChannelMissing
 
 from .axis_record import load_axis_record
 from .bead.measurement import BeadMeasurement
-from .torch_path import TorchPath, torch_path
+from .bead.plane import Plane
+from .bead.stitch import backwards
+from .registration import Tie, tie_bead
+from .torch_path import torch_path
 
 if TYPE_CHECKING:
     from seamlog.session import Session
@@ -22,21 +24,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-WORST_U_S_MM = 5.0
 EFFICIENCY = 0.8
 """Thermal efficiency of MAG welding, EN 1011-1."""
 PROCESS = "/weld/process"
-_BOTH = "start and stop of the bead tied to arc on and arc off"
-_START = "start of the bead tied to arc on"
-
-
-@dataclass(frozen=True, slots=True)
-class Tie:
-    """How the photo's arc length becomes that of the torch: s_torch = s_photo - offset_mm."""
-
-    offset_mm: float
-    u_s_mm: float
-    method: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,36 +37,14 @@ class Joined:
     tie: Tie
 
 
-def tie_bead(bead: BeadMeasurement, torch: TorchPath) -> Tie:
-    """Tie the bead's ends to the torch's path; `EvidenceError` says why it cannot be done."""
-    if bead.unit != "mm":
-        raise EvidenceError("the photo has no calibration, so its pixels have no place in mm")
-    if not bead.direction_known:
-        raise EvidenceError("the direction is ambiguous; say with --start where the weld began")
-    if bead.open_start:
-        raise EvidenceError("the start of the bead is not in the photo, so nothing ties it to time")
-    width = float(np.nanmedian(bead.width))
-    u_end = width / 6
-    if bead.open_stop:
-        return _checked(Tie(width / 2, float(np.hypot(torch.u_s_mm, u_end)), _START))
-    surplus = float(bead.s[-1] - torch.s_mm[-1])
-    miss = abs(surplus - width) / 2
-    return _checked(Tie(surplus / 2, float(np.hypot(torch.u_s_mm, max(miss, u_end))), _BOTH))
-
-
-def _checked(tie: Tie) -> Tie:
-    if tie.u_s_mm > WORST_U_S_MM:
-        raise EvidenceError(
-            f"places on the bead are known to {tie.u_s_mm:.1f} mm only ({tie.method}), "
-            f"{WORST_U_S_MM:g} mm are needed; check that photo and weld belong together"
-        )
-    return tie
-
-
-def join_bead(session: "Session", weld: "Weld", bead: BeadMeasurement) -> Joined:
+def join_bead(
+    session: "Session", weld: "Weld", bead: BeadMeasurement, plane: Plane | None = None
+) -> Joined:
     """Log values at each station; `EvidenceError` where bead and log cannot be tied."""
     torch = torch_path(session, weld)
-    tie = tie_bead(bead, torch)
+    tie = tie_bead(bead, torch, plane)
+    if tie.backwards:
+        bead = backwards(bead)
     s_mm = bead.s - tie.offset_mm
     inside = (s_mm >= 0) & (s_mm <= torch.s_mm[-1])
     s_mm = s_mm[inside]

@@ -11,6 +11,7 @@ from seamlog.results import Figure, Finding, Input, Part, Place, Severity
 
 from .bead.measurement import BeadMeasurement
 from .bead.part import BeadConfig
+from .bead.plane import Plane
 from .excursions import (
     Band,
     Cause,
@@ -20,8 +21,9 @@ from .excursions import (
     rank_causes,
     usual_band,
 )
-from .join import Tie, join_bead
+from .join import join_bead
 from .part_tables import Tables
+from .registration import Tie
 
 if TYPE_CHECKING:
     from seamlog.session import Session
@@ -44,11 +46,12 @@ def join_part(
     bead: BeadMeasurement,
     config: BeadConfig | None = None,
     inputs: Sequence[Input] = (),
+    plane: Plane | None = None,
 ) -> tuple[Part, Tables]:
     """Part `join` of one weld and one photo, with table `stations`."""
     config = config or BeadConfig()
     try:
-        joined = join_bead(session, weld, bead)
+        joined = join_bead(session, weld, bead, plane)
     except (EvidenceError, ChannelMissing) as error:
         return no_join(str(error), weld, inputs), {}
     columns, tie = joined.columns, joined.tie
@@ -68,6 +71,7 @@ def join_part(
             "method": tie.method,
             "offset_mm": tie.offset_mm,
             "u_s_mm": tie.u_s_mm,
+            "backwards": tie.backwards,
             "start_ns": weld.start_ns,
             "end_ns": weld.end_ns,
             "causes": [_cause_details(columns, *item) for item in found],

@@ -6,7 +6,7 @@ robustly, and s_mm is the arc length of that curve from ARC_ON.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,6 +40,8 @@ class TorchPath:
     u_s_mm: float
     """Standard uncertainty of an arc length: scatter of the marker and scale of the camera."""
     u_speed_mm_s: float
+    path_mm: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    """Places of the torch on the plate in the table frame, shape (n, 2)."""
 
     def at(self, stamp_ns: NDArray[np.int64]) -> FloatArray:
         """s_mm at other stamps; NaN outside the weld."""
@@ -104,6 +106,7 @@ def path_of(
         speed_mm_s=np.hypot(x.slope, y.slope),
         u_s_mm=float(np.hypot(u_start, scale_relative_u * s_mm[-1])),
         u_speed_mm_s=float(np.hypot(x.u_slope, y.u_slope)),
+        path_mm=np.column_stack([x.value, y.value]),
     )
 
 

@@ -18,7 +18,8 @@ class Plane:
     """Homography between photo pixels, freed from the lens's distortion, and the measuring plane.
 
     `unit` is `mm` or `px`; `scale_relative_u` the relative standard uncertainty of a length;
-    `residual` the rms distance of the calibration points, in `unit`.
+    `residual` the rms distance of the calibration points, in `unit`; `frame_u` the standard
+    uncertainty of places in the table frame.
     """
 
     plane_from_px: NDArray[np.float64]
@@ -27,6 +28,7 @@ class Plane:
     residual: float
     in_table_frame: bool = False
     lens: Lens | None = None
+    frame_u: float = 0.0
 
     def to_plane(self, points_px: Points) -> Points:
         """Plane coordinates of photo points, shape (n, 2)."""
@@ -79,6 +81,7 @@ def plane_of(photo: Photo, calibration: Calibration | None) -> Plane:
             calibration.residual_mm,
             calibration.frame == "table",
             calibration.lens,
+            calibration.frame_u_mm,
         )
     scale = calibration.mm_per_px
     return Plane(np.diag([scale, scale, 1.0]), "mm", calibration.scale_relative_u, 0.0)

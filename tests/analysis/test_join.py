@@ -5,13 +5,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead_assess import bead_and_join
-from seamlog.analysis.join import tie_bead
+from seamlog.analysis.registration import tie_bead
 from seamlog.analysis.torch_path import TorchPath
+from seamlog.calibration import PlaneCalibration, load_calibration, rows_of
 from seamlog.cli import run
 from seamlog.errors import EvidenceError
 from seamlog.results import Verdict
@@ -123,13 +125,40 @@ def test_the_planted_cause_is_found(session: Session, weld: Path) -> None:
     assert (units["heat_kj_mm"], units["command"]) == ("kJ/mm", "N")
 
 
-def test_an_unknown_direction_is_not_assessed(session: Session, weld: Path) -> None:
-    *_, (join, tables, _) = bead_and_join(
-        session, session.welds, (weld.with_name("weld.bead.jpg"),)
+def test_without_start_the_shape_of_the_path_tells_the_direction(
+    session: Session, weld: Path, tmp_path: Path
+) -> None:
+    """The photo turned by half a turn: the weld now begins at its right."""
+    picture = cv2.imread(str(weld.with_name("weld.bead.jpg")))
+    turned = tmp_path / "turned.png"
+    assert cv2.imwrite(str(turned), np.ascontiguousarray(np.asarray(picture)[::-1, ::-1]))
+    calibration = load_calibration(weld.with_name("weld.bead.calibration.json"))
+    assert isinstance(calibration, PlaneCalibration)
+    size = (calibration.image_width_px - 1, calibration.image_height_px - 1)
+    over = np.array([[-1.0, 0, size[0]], [0, -1.0, size[1]], [0, 0, 1]])
+    moved = calibration.model_copy(
+        update={"plane_mm_from_px": rows_of(calibration.matrix() @ over)}
     )
-    assert join.part == "join"
-    assert join.verdict is Verdict.NOT_ASSESSED
-    assert "--start" in join.reason
+    turned.with_suffix(".calibration.json").write_text(moved.model_dump_json(by_alias=True))
+    *_, (join, _, _) = bead_and_join(session, session.welds, (turned,))
+    planted = json.loads(session.metadata["seamlog.truth"]["json"])["planted_cause"]
+    assert join.details["backwards"] is True
+    assert "shape" in join.details["method"]
+    (cause,) = join.details["causes"]
+    assert (cause["channel"], cause["s_mm"]) == (
+        planted["channel"],
+        pytest.approx(planted["s_mm"], abs=3),
+    )
+
+
+def test_a_bead_without_calibration_is_not_assessed(
+    session: Session, weld: Path, tmp_path: Path
+) -> None:
+    photo = tmp_path / "alone.jpg"
+    photo.write_bytes(weld.with_name("weld.bead.jpg").read_bytes())
+    *_, (join, tables, _) = bead_and_join(session, session.welds, (photo,))
+    assert (join.part, join.verdict) == ("join", Verdict.NOT_ASSESSED)
+    assert "no calibration" in join.reason
     assert not tables
     assert join.details["causes"] == []
 
