@@ -1,7 +1,7 @@
 /* Dense curves by pixel column: first, lowest, highest and last value of each, whatever the zoom. The
    extremes of blocks are found once, so that a million points cost no more than the pixels. */
 
-const BLOCK = 256;
+const BLOCK = 64;
 
 function extremes(ys, from, to) {
   let low = Infinity, high = -Infinity;
@@ -18,6 +18,14 @@ function blocksOf(ys) {
   const lows = new Float64Array(count), highs = new Float64Array(count);
   for (let b = 0; b < count; b++) [lows[b], highs[b]] = extremes(ys, b * BLOCK, (b + 1) * BLOCK);
   return { lows, highs };
+}
+
+/* The blocks of a column without gaps, found once. */
+const knownBlocks = new WeakMap();
+
+function blocksFor(ys) {
+  if (!knownBlocks.has(ys)) knownBlocks.set(ys, blocksOf(ys));
+  return knownBlocks.get(ys);
 }
 
 /* Lowest and highest of ys[from] to ys[to - 1]. */
@@ -58,10 +66,9 @@ function eachColumn(xs, ys, blocks, first, last, min, max, width, each) {
 
 /* A path builder of uPlot for curves without gaps and bands. */
 function columnPaths() {
-  let known = null, blocks = null;
   return (u, at, first, last) => {
     const xs = u.data[0], ys = u.data[at];
-    if (known !== ys) { known = ys; blocks = blocksOf(ys); }
+    const blocks = blocksFor(ys);
     const { min, max } = u.scales.x;
     const { left, top, width, height } = u.bbox;
     const y = u.scales.y, scale = height / (y.max - y.min);

@@ -47,7 +47,7 @@ function seriesOf(spec, data) {
     const gappy = Array.isArray(data[list.length]);
     const paths = pathsOf(series.step, !gappy && !banded);
     const dots = gappy ? { show: true, size: 3, filter: alone } : points;
-    list.push({ label: series.label, stroke, width: LINE, paths, points: dots, spanGaps: false });
+    list.push({ label: series.label, auto: false, stroke, width: LINE, paths, points: dots, spanGaps: false });
     if (series.low && series.high) {
       const edge = { stroke: "transparent", width: 0, points, auto: false };
       list.push({ ...edge, label: "high" }, { ...edge, label: "low" });
@@ -103,6 +103,12 @@ function extentOf(u, columns) {
   const [first, last] = u.series[0].idxs;
   let low = Infinity, high = -Infinity;
   for (const column of columns) {
+    if (column instanceof Float64Array) {
+      const [least, most] = extremesOf(column, blocksFor(column), first, last + 1);
+      low = Math.min(low, least);
+      high = Math.max(high, most);
+      continue;
+    }
     for (let i = first; i <= last; i++) {
       const value = column[i];
       if (value === null || value === undefined) continue;
@@ -113,10 +119,11 @@ function extentOf(u, columns) {
   return [low, high];
 }
 
-/* Range of y: the values in view, the limits, and bands as far as curves stay readable. */
-function rangeOf(spec, bands) {
-  return (u, low, high) => {
-    let bottom = low ?? Infinity, top = high ?? -Infinity;
+/* Range of y: the values in view, the limits, and bands as far as curves stay readable. uPlot finds
+   none itself (auto: false), since it would look at every point. */
+function rangeOf(spec, bands, places) {
+  return (u) => {
+    let [bottom, top] = extentOf(u, places.map((i) => u.data[i]));
     const reach = BAND_REACH * (top - bottom) || Infinity;
     const edges = extentOf(u, bands.flatMap((band) => band.series).map((i) => u.data[i]));
     bottom = Math.min(bottom, Math.max(edges[0], bottom - reach));
@@ -150,7 +157,7 @@ async function makePlot(figure, spec, read, bus) {
     width: Math.max(box.clientWidth, 280), height, series: list, bands,
     legend: { show: false },
     padding: [8, 12, 0, 0],
-    scales: { x: { time: false }, y: { range: rangeOf(spec, bands) } },
+    scales: { x: { time: false }, y: { range: rangeOf(spec, bands, places) } },
     axes: [axisOf(`${spec.x_label} [${spec.x_unit}]`, { size: 30 }), axisOf(spec.y_label, { size: 52 })],
     cursor: { y: false, drag: { x: true, y: false, setScale: true }, bind: { mouseleave: () => null } },
     hooks: {
