@@ -201,7 +201,7 @@ class Moment(Block):
 
     kind: Literal["moment"] = "moment"
     id: str
-    caption: str
+    place: PlaceLink | None = None
     photo: PictureBlock | None = None
     frame: Frame | None = None
     frames: Frames | None = Field(None, exclude=True, repr=False)

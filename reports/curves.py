@@ -86,6 +86,8 @@ class Plot(Block):
     y_label: str
     series: list[Series]
     limits: list[Limit] = Field(default_factory=list)
+    tolerance: tuple[float, float] | None = None
+    """Lower and upper limit, where both are given: shaded between."""
     marks: list[Mark] = Field(default_factory=list)
     compact: bool = False
     """Drawn low, as one of several strips over the same x."""

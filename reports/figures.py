@@ -73,6 +73,10 @@ def draw_plot(plot: Plot) -> Drawing:
     across = Scale(*_x_range(x), box.left, box.right)
     up = Scale(*_y_range(plot), box.bottom, box.top)
     shapes: list[Shape] = []
+    if plot.tolerance is not None:
+        low, high = (float(up.px(value)) for value in plot.tolerance)
+        area = f"M{box.left} {low:.1f}H{box.right}V{high:.1f}H{box.left}Z"
+        shapes.append(Shape(area, "tolerance", "tolerance"))
     for number, series in enumerate(plot.series):
         if series.low is not None and series.high is not None:
             low, high = (np.clip(e.values, up.low, up.high) for e in (series.low, series.high))

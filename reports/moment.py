@@ -26,7 +26,7 @@ def moment_of(run: Run) -> Moment | None:
         return None
     return Moment(
         id=anchor("moment", str(run.index)),
-        caption=f"At {place.text}" if place else "",
+        place=place,
         photo=photo,
         frame=frame,
         frames=frames,

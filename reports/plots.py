@@ -25,7 +25,11 @@ AXES = ("s_mm", "s_px", "stamp_ns")
 """Columns that a table can run along, the first it has being its x."""
 _SUFFIXES = {
     "mm": "mm",
+    "mm_s2": "mm/s²",
     "mm_s": "mm/s",
+    "m_s2": "m/s²",
+    "mm2": "mm²",
+    "deg": "°",
     "m_s": "m/s",
     "m": "m",
     "px": "px",

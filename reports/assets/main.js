@@ -96,8 +96,8 @@ async function enliven() {
   else if (photo) makeSlider(bus, photo.domain, photo.x, "Along the bead");
   else if (plot) makeSlider(bus, plot.spec.domain, plot.u.data[0], "Place");
   watchLinks(bus);
-  const first = document.querySelector("#verdict a.place[data-domain]");
-  if (first) bus.show(first.dataset.domain, Number(first.dataset.x));
+  const first = blocks.find((one) => one.kind === "moment" && one.place && one.place.domain !== null);
+  if (first) bus.show(first.place.domain, first.place.x);
   /* For scripts in the console and for tests: the cursor and the zoom of each domain. */
   window.seamlog = Object.freeze({ show: bus.show, zoom: bus.zoom, whole: bus.whole });
 }

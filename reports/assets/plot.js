@@ -95,6 +95,15 @@ function drawLines(u, spec) {
   ctx.restore();
 }
 
+function drawTolerance(u, spec) {
+  if (!spec.tolerance) return;
+  const [low, high] = spec.tolerance.map((value) => u.valToPos(value, "y", true));
+  const { ctx, bbox } = u;
+  const top = Math.max(high, bbox.top), bottom = Math.min(low, bbox.top + bbox.height);
+  ctx.fillStyle = colour("--tolerance");
+  ctx.fillRect(bbox.left, top, bbox.width, Math.max(bottom - top, 0));
+}
+
 /* How far a band may stretch the y axis beyond the values, in spans of the values. */
 const BAND_REACH = 0.5;
 
@@ -163,6 +172,7 @@ async function makePlot(figure, spec, read, bus) {
     hooks: {
       setCursor: [(u) => bus.moved(plot, u)],
       setScale: [(u, key) => { if (key === "x") bus.zoomed(plot, u.scales.x.min, u.scales.x.max); }],
+      drawClear: [(u) => drawTolerance(u, spec)],
       draw: [(u) => drawLines(u, spec)],
     },
   }, data, box);

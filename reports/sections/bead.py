@@ -55,7 +55,8 @@ def _width(run: Run, part: Part) -> list[AnyBlock]:
     plot = make_plot(
         run, part, _STATIONS, [name], title="Bead width along the weld", limits=_limits(part, name)
     )
-    plot = plot.model_copy(update={"series": _apart(run, part, plot.series[0])})
+    update = {"series": _apart(run, part, plot.series[0]), "tolerance": _tolerance(part, name)}
+    plot = plot.model_copy(update=update)
     return [plot, *_histogram(plot)]
 
 
@@ -88,6 +89,16 @@ def _limits(part: Part, name: str) -> list[Limit]:
                 text = format_quantity(value, unit=criterion.unit)
                 found[value] = Limit(label=f"{word} limit {text}", value=value)
     return list(found.values())
+
+
+def _tolerance(part: Part, name: str) -> tuple[float, float] | None:
+    """The tightest pair of limits on the width itself."""
+    known = [
+        limit for limit in part.criteria if limit.name in _on_value(name.rsplit("_", 1)[0], name)
+    ]
+    lower = [limit.lower for limit in known if limit.lower is not None]
+    upper = [limit.upper for limit in known if limit.upper is not None]
+    return (max(lower), min(upper)) if lower and upper and max(lower) < min(upper) else None
 
 
 def _on_value(stem: str, name: str) -> tuple[str, ...]:

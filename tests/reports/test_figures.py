@@ -3,7 +3,7 @@
 import re
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -39,6 +39,7 @@ def _points(path: str) -> Floats:
 
 
 @given(st.integers(0, 99_999), st.sampled_from([-1.0, 1.0]))
+@settings(deadline=None, max_examples=30)
 def test_a_single_spike_among_many_points_is_drawn(at: int, sign: float) -> None:
     y = np.sin(np.arange(100_000) / 300)
     y[at] = 9 * sign
@@ -89,6 +90,16 @@ def test_limits_and_marks_are_drawn_and_named() -> None:
     assert "upper limit 7 mm" in tips
     assert "wide" in tips
     assert "elsewhere" not in tips
+
+
+def test_the_tolerance_is_shaded_between_its_limits() -> None:
+    drawing = draw_plot(_plot(np.linspace(0, 10, 100), tolerance=(2.0, 8.0)))
+    low, high = (
+        float(text) for text in re.findall(r"[ V](\d+\.\d)[HV]", _path(drawing, "tolerance"))[:2]
+    )
+    line = _points(_path(drawing, "line"))
+    y = np.interp([2.0, 8.0], np.linspace(0, 10, len(line)), line[:, 1])
+    assert np.allclose([low, high], y, atol=0.3)
 
 
 def test_nothing_and_nothing_finite_can_be_drawn() -> None:
