@@ -31,6 +31,7 @@ class RecoveredFile:
         self._writer = FileWriter(
             file, index.library or f"seamlog {__version__}", index.profile or "ros2"
         )
+        self._metadata: list[tuple[str, dict[str, str]]] = []
         self._add_channels(index)
         self._written: dict[int, list[set[int]]] = {}
         self.known = set(index.channels)
@@ -127,8 +128,10 @@ class RecoveredFile:
         self._writer.copy_attachment(entry, raw)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record."""
-        self._writer.add_metadata(name, values)
+        """Write a metadata record, once."""
+        if (name, dict(values)) not in self._metadata:
+            self._metadata.append((name, dict(values)))
+            self._writer.add_metadata(name, values)
 
     def attach(self, name: str, data: bytes, media_type: str, log_time_ns: int) -> None:
         """Write an attachment that came from the loop and never was in a file."""

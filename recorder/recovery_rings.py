@@ -53,7 +53,7 @@ def find_rings(path: Path, recording_id: str | None) -> Rings | None:
     for folder in sorted(root().iterdir()):
         try:
             recording = read_recording(folder)
-        except (OSError, ValueError, TypeError, KeyError):
+        except (OSError, ValueError, TypeError, KeyError, UsageError):
             continue
         is_it = recording.partial == path.absolute()
         if recording.id == recording_id or (recording_id is None and is_it):
@@ -65,11 +65,14 @@ def find_rings(path: Path, recording_id: str | None) -> Rings | None:
 def _refuse_living(folder: Path, recording: Recording, path: Path) -> None:
     if not _is_free(folder / "lock"):
         raise UsageError(f"{path} is being recorded; end the recording first")
-    if _maps(recording.pid, folder):
-        raise UsageError(
-            f"{path}: process {recording.pid} still logs into {folder}, though its recorder "
-            "process is gone; end it first"
-        )
+    metadata = (item.get("metadata", {}) for _, item in iter_items(folder, 1))
+    joined = {int(row["producer_pid"]) for row in metadata if "producer_pid" in row}
+    for pid in sorted({recording.pid, *joined}):
+        if _maps(pid, folder):
+            raise UsageError(
+                f"{path}: process {pid} still logs into {folder}, though its recorder process is "
+                "gone; end it first"
+            )
 
 
 def _is_free(path: Path) -> bool:
@@ -108,7 +111,11 @@ def drain(rings: Rings, file: RecoveredFile, missing: Mapping[int, int]) -> dict
         for feed in feeds:
             while feed.pump(time.monotonic(), True):
                 pass
-    accounts = {feed.channel_id: _final(feed, missing.get(feed.channel_id, 0)) for feed in feeds}
+    in_snapshots = rings.recording.snapshot is not None
+    accounts = {
+        feed.channel_id: _final(feed, missing.get(feed.channel_id, 0), in_snapshots)
+        for feed in feeds
+    }
     _write_accounts(file, list(accounts.values()))
     return accounts
 
@@ -146,11 +153,15 @@ def _feed(folder: Path, item: dict[str, Any], file: RecoveredFile) -> Feed:
     return VaryingFeed(channel_id, topic, producer, ring, file, encoder)
 
 
-def _final(feed: Feed, missing: int) -> Account:
+def _final(feed: Feed, missing: int, in_snapshots: bool) -> Account:
     """Accepted = written + lost; with all rings drained, what is not lost has been written."""
     ring = feed.ring
     account = ring_account(feed.topic, feed.account().producer, ring, ring.accepted)
     lost = account.lost + max(0, missing - account.dropped)
+    if in_snapshots:
+        # What waited in the memory of the recorder process belonged to no snapshot yet.
+        rest = account.accepted - account.written - lost
+        return replace(account, lost=lost, discarded=max(0, rest))
     return replace(account, lost=lost, written=account.accepted - lost)
 
 
