@@ -238,7 +238,7 @@ class _Recovery:
         if END not in names and self._rings is not None:
             file.add_metadata(END, {"ending": "loop and recorder died"})
         elif END not in names and RECORDING in names:
-            file.add_metadata(END, {"ending": "the recorder died"})
+            file.add_metadata(END, {"ending": "the end of the file is missing"})
         if not self.result.is_complete:
             lost = [f"{row.topic}: {row.lost} lost" for row in self.result.channels if row.lost]
             texts = [*self.result.problems, *lost]

@@ -32,7 +32,7 @@ def _ending(session: Session) -> Iterator[Finding]:
     recording = session.metadata.get("seamlog.recording", {})
     end = session.metadata.get(END)
     if end and end.get("ending") != "closed":
-        cause = f"the recording ended because {end.get('ending')}; all it had accepted is here"
+        cause = f"the recording was not closed: {end.get('ending')}"
         yield _finding(session, "ended", Severity.WARNING, cause, "look at what ended the loop")
     rings = recording.get("ring_path", "")
     if not end and rings and Path(rings).is_dir():

@@ -47,7 +47,10 @@ def _text(found: "Recovery") -> str:
     lines += [f"  {row.topic:<{wide}}  {_counts(row)}" for row in found.channels]
     lines += [f"  {problem}" for problem in found.problems]
     if not found.end_known:
-        lines.append("Nothing tells what came after the end of the file: at most its last 0.1 s.")
+        lines.append(
+            "Nothing tells what came after the end of the file: 0.1 s at most where the recorder "
+            "died, any amount where a copy was cut."
+        )
     lines.append("Complete: nothing is missing." if found.is_complete else "Some of it is lost.")
     return "\n".join(lines)
 
