@@ -32,6 +32,8 @@ RAW_HEAD = struct.Struct("<BQIQQIIB")
 _STAMPS = 1 << 63
 _SEQUENCES = 1 << 32
 _LARGEST_PX = 65_500
+_LARGE_BYTES = 64 << 10
+_UINT8 = np.dtype(np.uint8)
 
 
 class VaryingWriter:
@@ -39,126 +41,165 @@ class VaryingWriter:
 
     `share` is the part of the ring it may fill, half of it with one message (so that one fits
     into an empty ring wherever that begins again).
+
+    The store of `head` publishes a message. What is known besides follows from it, so that an
+    interrupt between any two instructions leaves nothing to repair but `_known`, see `_place`.
     """
+
+    __slots__ = (
+        "_anchor",
+        "_channel_id",
+        "_data",
+        "_encode",
+        "_gaps",
+        "_gate",
+        "_known",
+        "_now",
+        "_owner",
+        "_ring",
+        "_shape",
+        "_share",
+        "_views",
+        "_words",
+    )
 
     def __init__(
         self, ring: Ring, gate: Gate, channel_id: int, clock: Clock, encode: Encode, share: float
     ) -> None:
         self._ring = ring
+        self._words, self._data = ring.words, ring.data
         self._gate = gate
+        self._owner = gate.owner
         self._channel_id = channel_id
         self._now, self._anchor = log_time_parts(clock)
         self._encode = encode
         self._share = int(ring.capacity * share)
-        self._head = 0
-        self._accepted = 0
+        self._known = (0, 0)
+        """`head` and the count of messages up to there."""
         self._gaps = 0
+        self._shape: tuple[int, ...] = ()
+        self._views: dict[int, NDArray[np.uint8]] = {}
 
     def put(self, stamp_ns: int, *values: Any) -> bool:
         """Log one message, values in the table's order."""
-        if get_ident() != self._gate.owner:
+        if get_ident() != self._owner:
             return self._gate.refuse_foreign()
         try:
+            time_ns = self._now() + self._anchor
+            _check_times(stamp_ns, time_ns)
             start, rest = self._encode(stamp_ns, *values)
-            head = self._message_head(stamp_ns, len(start) + len(rest)) + start
+            size = RECORD.size + len(start) + len(rest)
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
-        return self._store(head, rest)
+        at = self._place(size)
+        if at < 0:
+            return False
+        number = (self._known[1] + self._gaps) % _SEQUENCES
+        length = size - RECORD_HEAD_BYTES
+        RECORD.pack_into(
+            self._data, at, MESSAGE, length, self._channel_id, number, time_ns, stamp_ns
+        )
+        body = at + RECORD.size + len(start)
+        self._data[at + RECORD.size : body] = start
+        self._data[body : at + size] = rest
+        return self._publish(at, size)
 
-    def put_frame(self, stamp_ns: int, image: NDArray[Any]) -> bool:
+    def put_frame(self, stamp_ns: int, image: Any) -> bool:
         """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""
-        if get_ident() != self._gate.owner:
+        if get_ident() != self._owner:
             return self._gate.refuse_foreign()
         try:
-            pixels, shape = _pixels(image)
-            head = self._raw_head(stamp_ns, len(pixels), shape)
+            time_ns = self._now() + self._anchor
+            _check_times(stamp_ns, time_ns)
+            if image.__class__ is not np.ndarray:
+                image = np.asarray(memoryview(image))
+            if image.dtype != _UINT8:
+                _check_picture(image)
+            shape = image.shape
+            if shape != self._shape:
+                _check_picture(image)
+                self._shape, self._views = shape, {}
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
-        return self._store(head, pixels)
+        size = RAW_HEAD.size + image.size
+        at = self._place(size)
+        if at < 0:
+            return False
+        number = (self._known[1] + self._gaps) % _SEQUENCES
+        length = size - RECORD_HEAD_BYTES
+        form = shape if len(shape) == 3 else (*shape, 1)
+        RAW_HEAD.pack_into(self._data, at, RAW_FRAME, length, number, time_ns, stamp_ns, *form)
+        view = self._views.get(at)
+        if view is None:
+            view = self._view(at, image.size)
+        view[...] = image
+        return self._publish(at, size)
 
     def stop(self) -> None:
         """Take nothing more; the gate is closed already."""
 
-    def _sequence(self) -> int:
-        return (self._accepted + self._gaps) % _SEQUENCES
+    def _view(self, at: int, size: int) -> NDArray[np.uint8]:
+        """Where the pixels of a record at `at` go; kept, as a ring comes round again and again."""
+        pixels = np.frombuffer(self._data, np.uint8, size, at + RAW_HEAD.size)
+        view = pixels.reshape(self._shape)
+        if size >= _LARGE_BYTES:
+            self._views[at] = view
+        return view
 
-    def _message_head(self, stamp_ns: int, size: int) -> bytes:
-        _check_stamp(stamp_ns)
-        length = RECORD.size - RECORD_HEAD_BYTES + size
-        log_time_ns = self._now() + self._anchor
-        return RECORD.pack(
-            MESSAGE, length, self._channel_id, self._sequence(), log_time_ns, stamp_ns
-        )
-
-    def _raw_head(self, stamp_ns: int, size: int, shape: tuple[int, int, int]) -> bytes:
-        _check_stamp(stamp_ns)
-        length = RAW_HEAD.size - RECORD_HEAD_BYTES + size
-        log_time_ns = self._now() + self._anchor
-        return RAW_HEAD.pack(RAW_FRAME, length, self._sequence(), log_time_ns, stamp_ns, *shape)
-
-    def _store(self, head: bytes, rest: Buffer) -> bool:
-        size = len(head) + len(rest)
-        at = self._reserve(size)
-        if at is None:
-            return False
-        body = at + len(head)
-        self._ring.data[at:body] = head
-        self._ring.data[body : at + size] = rest
-        return self._publish(at, size)
-
-    def _reserve(self, size: int) -> int | None:
-        """Offset for a record of `size` bytes, or None if it was turned away."""
+    def _place(self, size: int) -> int:
+        """Offset for a record of `size` bytes, -1 if it was turned away."""
+        head, accepted = self._known
+        if self._words[HEAD] != head:
+            # An interrupt came between publishing a message and counting it.
+            head = self._count(int(self._words[HEAD]), accepted + 1)
         if size > self._share // 2:
             self._gate.refuse(f"the message has {size} bytes, one may have {self._share // 2}")
-            return None
-        capacity = self._ring.capacity
-        rest = capacity - self._head % capacity
-        end = self._head + size + (rest if rest < size else 0)
-        if self._gate.is_open and (self._fits(end) or self._gate.has_room(lambda: self._fits(end))):
-            return self._start(rest, size)
-        if not self._gate.is_open:
-            self._gate.refuse_closed()
-            return None
-        self._gaps += 1
-        self._gate.drop(self._accepted + self._gaps - 1)
-        return None
-
-    def _fits(self, end: int) -> bool:
-        return end - int(self._ring.words[TAIL]) <= self._share
-
-    def _start(self, rest: int, size: int) -> int:
-        at = self._head % self._ring.capacity
+            return -1
+        at = head % self._ring.capacity
+        rest = self._ring.capacity - at
+        end = head + size + (rest if rest < size else 0)
+        fits = self._gate.is_open and end - self._words[TAIL] <= self._share
+        if not (fits or self._gate.has_room(lambda: end - self._words[TAIL] <= self._share)):
+            return self._turn_away()
         if rest >= size:
             return at
-        self._ring.data[at] = SKIP
+        self._data[at] = SKIP
         return 0
 
+    def _turn_away(self) -> int:
+        if not self._gate.is_open:
+            self._gate.refuse_closed()
+            return -1
+        self._gaps += 1
+        self._gate.drop(self._known[1] + self._gaps - 1)
+        return -1
+
     def _publish(self, at: int, size: int) -> bool:
-        capacity = self._ring.capacity
-        skipped = -self._head % capacity if at == 0 else 0
-        self._head += skipped + size
-        self._ring.words[HEAD] = self._head
-        self._accepted += 1
-        self._ring.words[ACCEPTED] = self._accepted
+        head, accepted = self._known
+        end = head + size + (-head % self._ring.capacity if at == 0 else 0)
+        self._words[HEAD] = end
+        self._count(end, accepted + 1)
         return True
 
+    def _count(self, head: int, accepted: int) -> int:
+        self._words[ACCEPTED] = accepted
+        self._known = (head, accepted)
+        return head
 
-def _check_stamp(stamp_ns: int) -> None:
+
+def _check_times(stamp_ns: int, log_time_ns: int) -> None:
     if not 0 <= stamp_ns.__index__() < _STAMPS:
         raise ValueError(f"stamp_ns must be from 0 to 2**63 - 1, got {stamp_ns}")
+    if not 0 <= log_time_ns.__index__() < _STAMPS:
+        raise ValueError(f"the clock must tell from 0 to 2**63 - 1 ns, it tells {log_time_ns}")
 
 
-def _pixels(image: Any) -> tuple[memoryview, tuple[int, int, int]]:
-    """The bytes of a picture and its rows, columns and samples; `ValueError` if it is none."""
-    view = memoryview(image)
-    if not view.c_contiguous:
-        view = np.ascontiguousarray(image).data
-    form = view.shape or ()
-    if view.format != "B" or len(form) not in (2, 3) or 0 in form or form[2:] not in ((), (3,)):
+def _check_picture(image: NDArray[Any]) -> None:
+    form = image.shape
+    if image.dtype != _UINT8 or len(form) not in (2, 3) or 0 in form or form[2:] not in ((), (3,)):
         raise ValueError(
             "a picture is uint8 of shape (rows, columns) or (rows, columns, 3), got "
-            f"{view.format!r} of shape {form}"
+            f"{image.dtype} of shape {form}"
         )
     if max(form) > _LARGEST_PX:
         raise ValueError(f"a picture of {form[1]} x {form[0]} px is larger than JPEG allows")
-    return view.cast("B"), (form[0], form[1], form[2] if len(form) == 3 else 1)
