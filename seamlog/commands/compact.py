@@ -12,7 +12,7 @@ from seamlog.outcome import Ending, Outcome
 @output_option("The session to write.")
 @force_option
 def compact(session: Path, output: Path, force: bool) -> Outcome:
-    """Rewrite SESSION (all its files) into one file with chunks of 1 MiB, one channel each.
+    """Rewrite SESSION (all its files) into one file with chunks of 2 MiB, one channel each.
 
     No message is changed. What is damaged is left out and said (exit code 1).
     """

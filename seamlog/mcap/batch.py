@@ -28,13 +28,13 @@ from seamlog.segments import PROBLEMS, RECORDING
 if TYPE_CHECKING:
     from seamlog.session import Session
 
-_CHUNK_BYTES = 1 << 20
+_CHUNK_BYTES = 2 << 20
 
 
 class BatchWriter:
     """Writes a session to `path`, whole or not at all; use it as a context manager.
 
-    Chunks of 1 MiB and more, one channel each; pictures are stored uncompressed. `OutputExists` if
+    Chunks of 2 MiB, one channel each; pictures are stored uncompressed. `OutputExists` if
     the file is there and `force` is not set.
     """
 

@@ -16,13 +16,13 @@ from seamlog.mcap.records import ChannelRecord
 from seamlog.mcap.rows import Batch, iter_batches
 from seamlog.mcap.writer import FileWriter
 
-_CHUNK_BYTES = 1 << 20
+_CHUNK_BYTES = 2 << 20
 _CHANNEL = 9
 """Offset of the channel id in a Message record."""
 
 
 def compact_files(files: Sequence[McapFile], writer: FileWriter, compression: str) -> None:
-    """Write all messages of `files` into chunks of at least 1 MiB."""
+    """Write all messages of `files` into chunks of 2 MiB."""
     parts: dict[int, list[tuple[McapFile, ChannelRecord]]] = {}
     for file in files:
         for row in file.index.channels.values():

@@ -118,6 +118,8 @@ class Batch:
         if self.uniform:
             return self.uniform.column(at - PAYLOAD, form)
         kind = np.dtype(form)
+        if not len(self.offsets):
+            return np.empty(0, kind)
         windows = np.lib.stride_tricks.sliding_window_view(self.data, kind.itemsize)
         values: NDArray[Any] = windows[self.offsets + at].view(kind).ravel()
         return values

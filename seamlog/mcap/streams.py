@@ -11,7 +11,7 @@ from seamlog.mcap.packing import payload_records
 if TYPE_CHECKING:
     from seamlog.mcap.writer import FileWriter
 
-_CHUNK_BYTES = 1 << 20
+_CHUNK_BYTES = 2 << 20
 
 
 class MessageStream:
