@@ -13,6 +13,7 @@ from .bead.sources import attached_photos, photo_files
 from .inspection import InspectionSettings, inspect_photos, stitched
 from .join_part import join_part, no_join
 from .quality.part import QualityConfig
+from .surface.heights import heights_of, heights_part
 
 if TYPE_CHECKING:
     from seamlog.session import Session
@@ -27,7 +28,7 @@ def bead_and_join(
     config: Path | None = None,
     settings: tuple[str, ...] = (),
 ) -> list[tuple[Part, Tables, Pictures]]:
-    """Parts `bead`, `surface`, `quality` of each photo, `join` of each weld; none without photos.
+    """Parts `bead`, `surface`, `quality` of each photo, `profile` and `join` of each weld.
 
     Without `photos` those attached to the session are taken. With as many photos as welds each
     belongs to the weld of its number; else all of them to the only weld.
@@ -35,15 +36,18 @@ def bead_and_join(
     settled = load_config(BeadConfig, "bead", config, settings)
     quality = load_config(QualityConfig, "quality", config, settings)
     sources = photo_files(photos, None) if photos else attached_photos(session)
+    spans: Sequence[Weld | None] = welds or [None]
+    profiles = [found for weld in spans if (found := heights_part(session, weld))]
     if not sources:
-        return []
+        return profiles
     only = welds[0].number if len(welds) == 1 else None
     assessed = assess_photos(sources, start, settled, only)
     inputs = [input_of(path) for path in session.paths]
     whole = stitched(assessed, settled) if len(welds) == 1 else ""
     if isinstance(whole, AssessedPhoto):
         assessed = [*assessed, whole]
-    parts = inspect_photos(assessed, InspectionSettings(quality))
+    heights = heights_of(profiles[0][0]) if len(profiles) == 1 else ()
+    parts = [*inspect_photos(assessed, InspectionSettings(quality, None, heights)), *profiles]
     if not welds:
         return [*parts, (no_join("the session has no weld", None, inputs), {}, {})]
     for index, weld in enumerate(welds):

@@ -92,6 +92,17 @@ _TABLE = (
         "picture of the seam in front of the torch",
     ),
     Channel(
+        "/camera/stripe",
+        IMAGE_SCHEMA,
+        (
+            *_HEADER,
+            Field("string", "format", "", "jpeg or png"),
+            Field("uint8[]", "data", "", "encoded picture"),
+        ),
+        10.0,
+        "picture of a laser stripe across the bead",
+    ),
+    Channel(
         "/camera/info",
         CAMERA_INFO_SCHEMA,
         (
@@ -174,6 +185,14 @@ _TABLE = (
         "seam path in the table frame, a polyline dense enough to be taken as the curve",
         Field("float64[]", "x_m", "m", "across the seam"),
         Field("float64[]", "y_m", "m", "along the robot's travel"),
+    ),
+    _own(
+        "/seam/profile",
+        "SeamProfile",
+        10.0,
+        "height profile across the seam, from a laser sensor",
+        Field("float64[]", "x_m", "m", "across the seam"),
+        Field("float64[]", "z_m", "m", "height, up"),
     ),
     _own(
         "/robot/marker",

@@ -69,18 +69,22 @@ def measure(
     from seamlog.analysis.bead.part import BeadConfig
     from seamlog.analysis.inspection import InspectionSettings, inspect_photos, stitched
     from seamlog.analysis.quality.part import QualityConfig
+    from seamlog.analysis.surface.heights import heights_of
     from seamlog.config import load_config
 
     _check_output(output, force)
     settled = load_config(BeadConfig, "bead", config, settings)
     quality = load_config(QualityConfig, "quality", config, settings)
     earlier = load_photo(before) if before else None
+    profiles = _profiles(session, weld)
     sources = _sources(photos, session, calibration)
     assessed = assess_photos(sources, start, settled, weld)
     whole = stitched(assessed, settled)
     if isinstance(whole, AssessedPhoto):
         assessed = [*assessed, whole]
-    parts = inspect_photos(assessed, InspectionSettings(quality, earlier))
+    heights = heights_of(profiles[0]) if profiles else ()
+    parts = inspect_photos(assessed, InspectionSettings(quality, earlier, heights))
+    parts += [profiles] if profiles else []
     if output is not None:
         _write(output, parts)
     if len(assessed) == 1 and assessed[0].refusal is not None:
@@ -114,12 +118,25 @@ def _sources(photos: tuple[Path, ...], session: Path | None, calibration: Path |
     return found
 
 
+def _profiles(session: Path | None, number: int | None) -> "Inspected | None":
+    """Laser profiles of the weld, if the session has some."""
+    from seamlog.analysis.surface.heights import heights_part
+    from seamlog.analysis.welds import chosen_welds
+    from seamlog.session import open_session
+
+    if session is None:
+        return None
+    with open_session(session) as opened:
+        welds = chosen_welds(opened, number)
+        return heights_part(opened, welds[0] if len(welds) == 1 else None)
+
+
 def _write(output: Path, parts: list["Inspected"]) -> None:
     """All parts, and the widths as CSV beside their Parquet table."""
     from seamlog.results import Results
 
     results = Results.create(output)
-    for kind in ("bead", "surface", "quality"):
+    for kind in ("bead", "surface", "quality", "profile"):
         for path in output.glob(f"{kind}*.json"):
             path.unlink()
     for part, tables, pictures in parts:

@@ -259,7 +259,45 @@ def table(
     return _written("table", fit.calibration, output, [f"points miss their places by {misses} mm"])
 
 
-for _act in (camera, plane, scale, table):
+@command("laser")
+@click.argument("photo", type=click.Path(path_type=Path))
+@click.option(
+    "--point",
+    "points",
+    type=float,
+    nargs=4,
+    multiple=True,
+    required=True,
+    metavar="X_PX Y_PX X_MM Z_MM",
+    help="A point of the stripe: its place across the seam and its height; four or more.",
+)
+@click.option("--lens", type=click.Path(path_type=Path), help="Lens from `calibrate camera`.")
+@output_option("Calibration file; attach it as laser_from_camera.json.")
+@force_option
+def laser(
+    photo: Path, points: tuple[tuple[float, ...], ...], lens: Path | None, output: Path, force: bool
+) -> Outcome:
+    """Find a laser's light plane from points of known height in a frame of its camera (PHOTO).
+
+    Lay steps or gauge blocks under the stripe and name the stripe's corners on them.
+    """
+    import numpy as np
+
+    from seamlog.analysis.bead.image import load_photo
+    from seamlog.analysis.calibration.laser import calibrate_laser
+
+    _check_free(output, force)
+    taken = load_photo(photo)
+    known = np.array(points, dtype=np.float64)
+    given = _lens(lens)
+    size = (taken.width_px, taken.height_px)
+    found = calibrate_laser(
+        known[:, :2], known[:, 2:], size, given.lens if given else None, _date(photo)
+    )
+    return _written("laser", found, output, [found.source, _u_line(found.scale_relative_u)])
+
+
+for _act in (camera, plane, scale, table, laser):
     calibrate.add_command(_act)
 
 
