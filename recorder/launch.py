@@ -39,8 +39,8 @@ def claim_partial(recording: Recording) -> int:
         _refuse_living(partial)
         if not recording.force:
             raise OutputExists(
-                f"{partial} is there already, from a recording that was not finished; move it "
-                "away, or give --force to replace it"
+                f"{partial} is there already, from a recording that was not finished; save it "
+                "with 'seamlog recover' and move it away, or give --force to replace it"
             )
         partial.unlink()
     second = segment_path(Path(recording.path), 2)

@@ -204,7 +204,11 @@ def _tell(status: Status, heard: Collection[str]) -> None:
 def _warn_of_abandoned() -> None:
     for folder in abandoned_folders():
         partial = read_recording(folder).partial
-        _log.warning("%s died unfinished; messages that it had accepted are in %s", partial, folder)
+        _log.warning(
+            "%s died unfinished; 'seamlog recover' takes what it had accepted from %s",
+            partial,
+            folder,
+        )
 
 
 def _leave_all() -> None:

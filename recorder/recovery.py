@@ -35,6 +35,7 @@ from .recovery_check import check_by_second_reader
 from .recovery_file import RecoveredFile
 from .recovery_rings import drain, find_rings
 from .recovery_tail import tail_messages
+from .segment import part_of
 
 END = "seamlog.recording.end"
 _STATUS = "/seamlog/recorder"
@@ -82,8 +83,11 @@ def default_output(path: Path) -> Path:
 def recover(path: Path, output: Path | None = None, force: bool = False) -> Recovery:
     """Make a session of what is whole of `path` and of the rings of its recording.
 
-    Raises `SessionError` if nothing is, `UsageError` if it is still being recorded, `OutputExists`.
+    Where `path` is not there and `path` + `.part` is, that one is meant. Raises `SessionError` if
+    nothing is whole, `UsageError` if it is still being recorded, `OutputExists`.
     """
+    if not path.exists() and part_of(path).exists():
+        path = part_of(path)
     target = output or default_output(path)
     if target.absolute() == path.absolute():
         raise UsageError(f"{path} is never changed; give another name with -o")

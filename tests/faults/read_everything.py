@@ -10,7 +10,9 @@ from pathlib import Path
 
 import seamlog
 from seamlog.cli import run
+from seamlog.commands.doctor import examine
 from seamlog.errors import SeamlogError
+from seamlog.recorder.recovery import recover
 
 KNOWN = (SeamlogError, FileNotFoundError)
 
@@ -41,6 +43,24 @@ def read(path: Path) -> list[str]:
     except KNOWN as error:
         errors.append(str(error))
     return errors
+
+
+def try_all(path: Path) -> None:
+    """Read `path` in every way; anything but the family's errors, each with the file, escapes."""
+    for text in read(path):
+        assert path.name in text or "is not there" in text or text.startswith("/"), text
+    try:
+        with seamlog.open_session(path) as session:
+            list(examine(session))
+    except SeamlogError as error:
+        assert path.name in str(error), error
+    output = path.with_name("out.mcap")
+    try:
+        recover(path, output, force=True)
+    except SeamlogError as error:
+        assert path.name in str(error), error
+    else:
+        output.unlink()
 
 
 def main(arguments: list[str]) -> int:

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from tests.core.scenarios import write_foreign, write_live
-from tests.faults.fuzz_reader import try_all
+from tests.faults.read_everything import try_all
 
 FUZZER = Path(__file__).with_name("fuzz_reader.py")
 FUZZ_S, LONG = 240, 5000
