@@ -154,10 +154,11 @@ def _import_whole(reader: Any, file: Path, output: Path | None, force: bool) -> 
     import tempfile
 
     from seamlog.mcap.batch import BatchWriter
+    from seamlog.progress import spinner
 
     with tempfile.TemporaryDirectory() as folder:
         path = output or Path(folder) / "dry.mcap"
-        with BatchWriter(path, force) as writer:
+        with spinner(f"importing {file}"), BatchWriter(path, force) as writer:
             notes = reader.write(file, writer)
             writer.add_metadata("seamlog.import", _provenance(file))
         return _whole_outcome(file, path, output, notes)

@@ -4,9 +4,11 @@ Everything is told from the file itself; what had to be decided is noted.
 """
 
 import codecs
+import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 from seamlog.errors import ImportFailed
@@ -69,7 +71,7 @@ def _decoded(path: Path, data: bytes, encoding: str) -> str:
 
 def layout_of(path: Path, text: str, encoding: str) -> Layout:
     """The layout of a table; `ImportFailed` if no rows of numbers are found."""
-    lines = text.splitlines()[: _LOOK + 40]
+    lines = [line.rstrip("\r\n") for line in islice(io.StringIO(text), _LOOK + 40)]
     separator, decimal = _separator(lines)
     rows = [split(line, separator) for line in lines]
     first = _first_row(rows, decimal)

@@ -12,12 +12,16 @@ from seamlog.errors import HardwareError, ImportFailed
 from .content import Content
 
 _HDF5 = b"MATLAB 7.3"
+_MOST_RECORDS = 64
+_WIDE = 4
+"""A matrix this much wider than high holds its signals in rows."""
 
 
 class MatImporter:
     """Reads the variables of a `.mat` file; fields of structures are named `variable.field`.
 
-    Vectors become columns, single numbers scalars, the columns of a matrix `name[0]`, `name[1]`.
+    Vectors become columns, single numbers scalars, the columns of a matrix `name[0]`, `name[1]`
+    (its rows, where it is much wider than high), elements of structure arrays `name[0].field`.
     What holds no numbers is left out.
     """
 
@@ -71,24 +75,30 @@ def _columns(name: str, value: Any, notes: list[str]) -> Iterator[tuple[str, NDA
         notes.append(f"variable {name} holds {type(value).__name__}, no numbers, and was left out")
     elif value.size == 0:
         notes.append(f"variable {name} is empty")
-    elif value.dtype.names and value.size == 1:
-        record = value.reshape(-1)[0]
-        for field in value.dtype.names:
-            yield from _columns(f"{name}.{field}", record[field], notes)
+    elif value.dtype.names and value.size <= _MOST_RECORDS:
+        for place, record in enumerate(value.reshape(-1)):
+            label = name if value.size == 1 else f"{name}[{place}]"
+            for field in value.dtype.names:
+                yield from _columns(f"{label}.{field}", record[field], notes)
     elif value.dtype == object and value.size == 1:
         yield from _columns(name, value.reshape(-1)[0], notes)
     elif value.dtype.kind in "biuf" and value.ndim <= 2:
-        yield from _numeric(name, value)
+        yield from _numeric(name, value, notes)
     else:
         what = f"{value.dtype} of shape {value.shape}"
         notes.append(f"variable {name} holds {what} and was left out")
 
 
-def _numeric(name: str, value: NDArray[Any]) -> Iterator[tuple[str, NDArray[Any]]]:
+def _numeric(
+    name: str, value: NDArray[Any], notes: list[str]
+) -> Iterator[tuple[str, NDArray[Any]]]:
     if value.size == 1:
         yield name, value.reshape(())
     elif value.ndim == 1 or min(value.shape) == 1:
         yield name, value.reshape(-1)
     else:
+        if value.shape[1] > _WIDE * value.shape[0]:
+            notes.append(f"variable {name} is {value.shape[0]} rows: each was taken as a column")
+            value = value.T
         for index in range(value.shape[1]):
             yield f"{name}[{index}]", value[:, index]

@@ -29,8 +29,10 @@ class ParquetImporter:
         except (pa.ArrowException, OSError) as error:
             raise ImportFailed(f"{path} cannot be read as a Parquet file: {error}") from error
         content = Content({}, notes=[])
-        columns = {}
+        columns: dict[str, NDArray[Any]] = {}
         for field, column in zip(table.schema, table.columns, strict=True):
+            if _add_elements(field.name, column, columns):
+                continue
             values = _values(field.name, column, content)
             if values is None:
                 content.notes.append(f"column {field.name!r} holds {field.type} and was left out")
@@ -45,6 +47,21 @@ class ParquetImporter:
         return content
 
 
+def _add_elements(name: str, column: Any, columns: dict[str, NDArray[Any]]) -> bool:
+    """Add the columns `name[0]`, `name[1]` of arrays of one length; False for others."""
+    import pyarrow as pa
+
+    if not pa.types.is_fixed_size_list(column.type) or column.null_count:
+        return False
+    kind = column.type.value_type
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+        return False
+    flat = np.asarray(column.combine_chunks().flatten().to_numpy())
+    for place, values in enumerate(flat.reshape(-1, column.type.list_size).T):
+        columns[f"{name}[{place}]"] = np.ascontiguousarray(values)
+    return True
+
+
 def _values(name: str, column: Any, content: Content) -> NDArray[Any] | None:
     import pyarrow as pa
 
@@ -56,6 +73,15 @@ def _values(name: str, column: Any, content: Content) -> NDArray[Any] | None:
             return None
         content.units[name] = "ns"
         return np.asarray(column.cast(pa.timestamp("ns"), safe=False).cast(pa.int64()).to_numpy())
+    if pa.types.is_dictionary(kind):
+        column = column.cast(kind.value_type)
+        kind = column.type
+    if pa.types.is_duration(kind) and not column.null_count:
+        content.units[name] = "ns"
+        return np.asarray(column.cast(pa.duration("ns"), safe=False).cast(pa.int64()).to_numpy())
+    if pa.types.is_decimal(kind):
+        column = column.cast(pa.float64())
+        kind = column.type
     if pa.types.is_boolean(kind):
         column = column.cast(pa.int8())
     elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):

@@ -185,6 +185,22 @@ def test_matlab_73_is_read(tmp_path: Path) -> None:
     assert columns["axis.q[1]"].tolist() == [4.0, 5.0, 6.0, 7.0]
 
 
+def test_odd_parquet_types_are_read(tmp_path: Path) -> None:
+    arrays = pa.FixedSizeListArray.from_arrays(pa.array([1.0, 2.0, 3.0, 4.0]), 2)
+    spans = pa.array([1_000, 2_000], pa.duration("us"))
+    coded = pa.array([5, 6]).dictionary_encode()
+    table = pa.table({"a": arrays, "d": spans, "c": coded, "s": pa.array([{"x": 1}, {"x": 2}])})
+    pq.write_table(table, tmp_path / "x.parquet")
+    columns = ParquetImporter().load(tmp_path / "x.parquet").columns
+    assert {name: column.tolist() for name, column in columns.items()} == {
+        "a[0]": [1.0, 3.0],
+        "a[1]": [2.0, 4.0],
+        "d": [1_000_000, 2_000_000],
+        "c": [5, 6],
+        "s.x": [1, 2],
+    }
+
+
 def test_parquet_columns_are_read(tmp_path: Path) -> None:
     moments = pa.array([1_000, 2_000], pa.timestamp("us", tz="UTC"))
     unit = pa.field("x", pa.float32(), metadata={"unit": "mm"})

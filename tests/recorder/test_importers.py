@@ -191,6 +191,12 @@ def test_structures_and_matrices_become_columns(tmp_path: Path) -> None:
     scipy.io.savemat(tmp_path / "s.mat", {"run": {"v": [1.0, 2.0]}, "m": np.eye(3), "name": "x"})
     columns = MatImporter().load(tmp_path / "s.mat").columns
     assert set(columns) == {"run.v", "m[0]", "m[1]", "m[2]"}
+    several = np.array([([1.0, 2.0],), ([3.0, 4.0],)], dtype=[("v", object)])
+    scipy.io.savemat(tmp_path / "t.mat", {"s": several, "wide": np.arange(20.0).reshape(2, 10)})
+    columns = MatImporter().load(tmp_path / "t.mat").columns
+    assert columns["s[1].v"].tolist() == [3.0, 4.0]
+    assert columns["wide[1]"].tolist() == list(range(10, 20))
+    columns = MatImporter().load(tmp_path / "s.mat").columns
     assert columns["run.v"].tolist() == [1.0, 2.0]
 
 
