@@ -7,9 +7,10 @@ from typing import Any
 
 from seamlog.channels import CHANNELS, EVENT_KINDS
 from seamlog.errors import SeamlogError
+from seamlog.files import is_being_written
 from seamlog.findings import Finding, Severity
 from seamlog.mcap.channel_course import Courses
-from seamlog.segments import PROBLEMS
+from seamlog.segments import PROBLEMS, RECORDING
 from seamlog.session import Session
 
 _STATUS, _EVENTS = CHANNELS["/seamlog/recorder"], CHANNELS["/events"]
@@ -21,6 +22,7 @@ _KINDS = {number: name for name, number in EVENT_KINDS.items()}
 
 def iter_account_findings(session: Session, courses: Courses) -> Iterator[Finding]:
     """Drops, losses, sums that do not add up, clock steps, and how the recording ended."""
+    yield from _files(session)
     yield from _ending(session)
     yield from _copied(session)
     yield from _clock_steps(session)
@@ -28,16 +30,39 @@ def iter_account_findings(session: Session, courses: Courses) -> Iterator[Findin
         yield from _account(session, row, courses)
 
 
+def _files(session: Session) -> Iterator[Finding]:
+    """Files that the recording had and that are not here."""
+    recordings = [
+        values for file in session.files for name, values in file.metadata if name == RECORDING
+    ]
+    present = {int(row["index"]) for row in recordings if row.get("index", "").isdigit()}
+    missing = sorted(set(range(1, max(present, default=0) + 1)) - present)
+    if not missing:
+        return
+    named = ", ".join(map(str, missing))
+    if len(missing) <= _removed(session):
+        cause = f"file {named} of the recording was removed to keep its disk budget"
+        yield _finding(session, "file-removed", Severity.NOTE, cause, "nothing: as configured")
+    else:
+        cause = f"file {named} of the recording is not here"
+        yield _finding(session, "file-missing", Severity.ERROR, cause, "put it beside the others")
+
+
+def _removed(session: Session) -> int:
+    return int(session.metadata.get(RECORDING, {}).get("removed", "0"))
+
+
 def _ending(session: Session) -> Iterator[Finding]:
-    recording = session.metadata.get("seamlog.recording", {})
+    recording = session.metadata.get(RECORDING, {})
     end = session.metadata.get(END)
     if end and end.get("ending") != "closed":
         cause = f"the recording was not closed: {end.get('ending')}"
         yield _finding(session, "ended", Severity.WARNING, cause, "look at what ended the loop")
     rings = recording.get("ring_path", "")
-    if not end and rings and Path(rings).is_dir():
+    is_living = any(is_being_written(path) for path in session.paths)
+    if not end and rings and Path(rings).is_dir() and not is_living:
         cause = f"accepted messages that are not in the file yet are in {rings}"
-        action = "'seamlog recover' takes them, unless the recording still runs"
+        action = "'seamlog recover' takes them"
         yield _finding(session, "rings-left", Severity.ERROR, cause, action)
 
 
@@ -103,7 +128,7 @@ def _account(session: Session, row: Mapping[str, Any], courses: Courses) -> Iter
             action = "see /events for the reason"
             yield _finding(session, name, Severity.ERROR, cause, action, **place)
     there = sum(course.count for key, course in courses.by_channel.items() if key[0] == topic)
-    is_final = END in session.metadata and topic not in _OWN
+    is_final = END in session.metadata and topic not in _OWN and not _removed(session)
     if is_final and row["written"] != there:
         cause = f"the recorder wrote {row['written']} messages and {there} are readable"
         action = "'seamlog recover' says what is missing where"

@@ -34,3 +34,17 @@ def write_bytes(path: Path, data: bytes, force: bool = True) -> None:
     """Write `data` to `path`, whole or not at all."""
     with replacing(path, force) as partial:
         partial.write_bytes(data)
+
+
+def is_being_written(path: Path) -> bool:
+    """True while a recorder process holds its lock on `path`."""
+    try:
+        import fcntl
+    except ImportError:
+        return False
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False

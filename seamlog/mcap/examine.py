@@ -8,6 +8,7 @@ from typing import Any
 from zlib_ng.zlib_ng import crc32
 
 from seamlog.errors import LimitExceeded, SessionError
+from seamlog.files import is_being_written
 from seamlog.findings import Finding, Severity
 from seamlog.limits import Limits
 from seamlog.mcap import records
@@ -32,6 +33,7 @@ class Examination:
         self.source, self.limits = source, limits
         self.told = load_index(source, limits)
         self.found = scan(source, "", limits) if self.told.summary_start else self.told
+        self.is_living = is_being_written(source.path)
 
     def iter_findings(self) -> Iterator[Finding]:
         """What is wrong with the file's frame; its chunks are examined one by one elsewhere."""
@@ -56,7 +58,11 @@ class Examination:
         if start is None and self.told.problems:
             is_open = self.source.data[-len(records.MAGIC) :] != records.MAGIC
             name = "unfinished" if is_open else "summary-damaged"
-            yield self.finding(name, error, self.told.problems[0], RECOVER)
+            if self.is_living:
+                cause = "the session is being recorded and was examined as far as it goes"
+                yield self.finding("recording", Severity.NOTE, cause, "nothing: let it go on")
+            else:
+                yield self.finding(name, error, self.told.problems[0], RECOVER)
         elif start is None:
             cause = "the file has no summary with a chunk index; it is read by walking over it"
             yield self.finding("no-summary", Severity.NOTE, cause, "nothing: it is legal")
@@ -71,6 +77,8 @@ class Examination:
 
     def _gaps(self) -> Iterator[Finding]:
         for start, end in self.found.gaps:
+            if self.is_living and end == self.source.size:
+                continue
             cause = "these bytes are no whole record: overwritten, cut off or never written"
             yield self.finding(
                 "bytes-lost", Severity.ERROR, cause, RECOVER, offset=start, length=end - start

@@ -1,7 +1,9 @@
 """`seamlog doctor` finds each planted fault, at its place, and nothing in what is whole."""
 
 import json
+import os
 import struct
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from seamlog import open_session
 from seamlog.cli import run
 from seamlog.mcap import records
 from seamlog.recorder import Recorder
+from seamlog.recorder.storage import Storage
 from tests.core.scenarios import SCENARIOS, picture, write_live
 
 Document = dict[str, Any]
@@ -25,6 +28,7 @@ Examine = Callable[[Path], Document]
 def examine(capsys: pytest.CaptureFixture[str]) -> Examine:
     def examine(path: Path) -> Document:
         before = path.read_bytes()
+        capsys.readouterr()
         code = run(["doctor", str(path), "--json"])
         assert path.read_bytes() == before
         document: Document = json.loads(capsys.readouterr().out)
@@ -174,6 +178,32 @@ def test_drops_gaps_and_steps_of_a_recording(tmp_path: Path, examine: Examine) -
     assert ids(document) == {"refused", "clock-step"}
     assert "+5.0" in finding(document, "clock-step")["cause"]
     assert finding(document, "refused")["topic"] == "/table/encoder"
+
+
+def test_a_session_that_is_being_recorded(tmp_path: Path, examine: Examine) -> None:
+    partial = tmp_path / "weld.mcap.part"
+    with Recorder(tmp_path / "weld.mcap") as recorder:
+        encoder = recorder.channel("/table/encoder")
+        for place in range(100):
+            encoder.put(recorder.clock.now_ns(), float(place), 0.0)
+        while not recorder.status().channels[0].written:
+            time.sleep(0.01)
+        assert run(["doctor", str(partial)]) == 0
+    assert ids(examine(tmp_path / "weld.mcap")) == set()
+
+
+def test_a_file_of_the_row_is_missing(tmp_path: Path, examine: Examine) -> None:
+    session, storage = tmp_path / "weld.mcap", Storage(segment_bytes=1 << 20)
+    with Recorder(session, pace="simulated", storage=storage) as recorder:
+        points = recorder.channel("/seam/points")
+        for stamp in range(120):
+            values = struct.unpack("<4000q", os.urandom(32_000))
+            points.put(stamp, [float(value) for value in values], [1.0])
+    assert ids(examine(session)) == set()
+    (tmp_path / "weld.0002.mcap").unlink()
+    document = examine(session)
+    assert "file 2" in finding(document, "file-missing")["cause"]
+    assert {"messages-missing", "sequence-gap"} <= ids(document)
 
 
 def test_messages_that_are_missing_between(live: Path, examine: Examine, tmp_path: Path) -> None:
