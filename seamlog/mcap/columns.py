@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from seamlog.errors import LimitExceeded
 from seamlog.limits import Limits
 from seamlog.mcap.rows import PAYLOAD, Batch, Rows
-from seamlog.mcap.shapes import Forms, Grammar, Shape
+from seamlog.mcap.shapes import Forms, Grammar, NoShape, Shape
 
 Columns = dict[str, NDArray[Any]]
 LOG_TIME = "log_time_ns"
@@ -123,7 +123,10 @@ class ChannelDecoder:
             if shape is None:
                 if self._is_varied:
                     return False
-                shape = self._grammar.learn(rows)
+                try:
+                    shape = self._grammar.learn(rows)
+                except NoShape:
+                    return False
                 known.append(shape)
                 self._learned += 1
             same = shape.matches(rows)

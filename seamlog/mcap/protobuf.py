@@ -32,6 +32,7 @@ from seamlog.mcap.shapes import (
     Form,
     Forms,
     Leaf,
+    NoShape,
     Read,
     Shape,
     Structure,
@@ -152,7 +153,7 @@ class _Walker:
             for same in zip(*parts, strict=True):
                 yield stacked_leaf(f"{name}.{same[0].name}", [leaf.read for leaf in same])
         elif len(parts) > 1:
-            raise Malformed(f"field {name} is there {len(parts)} times and cannot be merged")
+            raise NoShape(f"field {name} is there {len(parts)} times and must be merged")
         else:
             for leaf in parts[0] if parts else _absent(field.fields):
                 yield Leaf(f"{name}.{leaf.name}", leaf.read)

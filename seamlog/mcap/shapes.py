@@ -75,6 +75,10 @@ class Shape:
         return np.ones(rows.count, np.bool_) if same is None else same
 
 
+class NoShape(Exception):
+    """A message is valid and has no shape; it must be decoded on its own."""
+
+
 @runtime_checkable
 class Grammar(Protocol):
     """How the messages of one schema are read."""
@@ -82,7 +86,10 @@ class Grammar(Protocol):
     forms: Forms
 
     def learn(self, rows: Rows) -> Shape:
-        """The shape of the first row; `Malformed` if it does not fit the schema."""
+        """The shape of the first row; `Malformed` if it does not fit the schema.
+
+        Raises `NoShape` where only `decode` can read it.
+        """
         ...
 
     def decode(self, batch: Batch, names: Collection[str]) -> dict[str, NDArray[Any]]:

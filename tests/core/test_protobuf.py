@@ -155,3 +155,16 @@ def test_descriptors_that_do_not_hold_the_type_are_refused(tmp_path: Path) -> No
     path = write(tmp_path / "x.mcap", [b""], files, "test.Missing")
     with pytest.raises(SessionError, match=r"test\.Missing"):
         read(path)
+
+
+def test_a_message_given_in_two_parts_is_merged(tmp_path: Path) -> None:
+    """As protobuf asks of a field that is there twice."""
+    one, two = All(), All()
+    one.inner.x = 1.5
+    two.inner.words.append("late")
+    plain = All(one_int32=7).SerializeToString()
+    payloads = [plain, one.SerializeToString() + two.SerializeToString(), plain]
+    columns = read(write(tmp_path / "x.mcap", payloads, ALL_FILES, "test.All"))
+    assert columns["inner.x"].tolist() == [0.0, 1.5, 0.0]
+    assert columns["inner.words"].tolist() == [[], ["late"], []]
+    assert columns["one_int32"].tolist() == [7, 0, 7]

@@ -12,7 +12,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from mcap.reader import make_reader
 from nptdms import ChannelObject, TdmsWriter
+from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
@@ -313,3 +315,19 @@ def test_real_bags_are_imported_whole(data_dir: Path, tmp_path: Path, name: str)
 def test_real_files_import_by_the_maps_of_the_examples(data_dir: Path, name: str) -> None:
     mapping = Path(__file__).parents[2] / "examples" / f"{MAPS[name]}.map.toml"
     assert run(["import", str(data_dir / name), "--map", str(mapping), "--dry-run"]) == 0
+
+
+def test_readers_of_others_open_an_imported_session(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text(CSV)
+    assert run(["import", str(tmp_path / "x.csv"), "--guess", "-o", str(tmp_path / "m.toml")]) == 0
+    path = imported(tmp_path / "x.csv", "--map", str(tmp_path / "m.toml"))
+    assert run(["compact", str(path), "-o", str(tmp_path / "c.mcap")]) == 0
+    for session in (path, tmp_path / "c.mcap"):
+        with session.open("rb") as file:
+            reader = make_reader(file, validate_crcs=True)
+            count = sum(1 for _ in reader.iter_messages(["/import/x"]))
+        with AnyReader([session]) as bag:
+            rows = [bag.deserialize(raw, c.msgtype) for c, _, raw in bag.messages()]
+        spare = [row.spare for row in rows if hasattr(row, "spare")]
+        assert count == len(spare) == 60
+        assert spare[:8] == [0, 1, 2, 3, 4, 5, 6, 0]
