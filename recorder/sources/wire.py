@@ -32,13 +32,21 @@ def parse(parts: Sequence[bytes]) -> Message:
     row = CHANNELS.get(topic)
     if row is None or topic == "/seamlog/recorder":
         raise ValueError(f"no topic {topic!r}")
-    if name.startswith(_JSON):
-        return _from_json(row, parts[1])
-    if len(parts[1]) < _STAMP.size or len(parts[1]) % 8:
-        raise ValueError(f"{topic}: {len(parts[1])} bytes of numbers; 8 for each, the stamp first")
-    (stamp_ns,) = _STAMP.unpack_from(parts[1])
-    numbers = struct.unpack_from(f"<{len(parts[1]) // 8 - 1}d", parts[1], _STAMP.size)
-    return topic, stamp_ns, _values(row, numbers, parts[2:])
+    try:
+        return _parsed(row, name.startswith(_JSON), parts[1:])
+    except (OverflowError, RecursionError) as error:
+        raise ValueError(f"{topic}: {error}") from error
+
+
+def _parsed(row: Channel, is_json: bool, parts: Sequence[bytes]) -> Message:
+    if is_json:
+        return _from_json(row, parts[0])
+    size = len(parts[0])
+    if size < _STAMP.size or size % 8:
+        raise ValueError(f"{row.topic}: {size} bytes of numbers; 8 for each, the stamp first")
+    (stamp_ns,) = _STAMP.unpack_from(parts[0])
+    numbers = struct.unpack_from(f"<{size // 8 - 1}d", parts[0], _STAMP.size)
+    return row.topic, stamp_ns, _values(row, numbers, parts[1:])
 
 
 def _from_json(row: Channel, data: bytes) -> Message:

@@ -118,6 +118,25 @@ def test_nonsense_is_a_value_error(parts: list[bytes]) -> None:
     assert isinstance(stamp_ns, int)
 
 
+@pytest.mark.parametrize(
+    "parts",
+    [
+        [b"/events", struct.pack("<qd", 1, float("inf")), b"x"],
+        [b"/events", struct.pack("<qd", 1, float("nan")), b"x"],
+        [b"json /events", b"[" * 100_000],
+        [b"json /events", b'{"kind": 1, "detail": "a", "more": 2}'],
+        [b"json /events", b"\xff\xfe"],
+        [b"/camera/image", struct.pack("<q", 1), b"GIF89a"],
+        [b"/camera/image", struct.pack("<q", 1)],
+        [b"/seam/points", struct.pack("<q2d", 1, 2.0, 3.0)],
+        [b"/seamlog/recorder", struct.pack("<q", 1)],
+    ],
+)
+def test_what_cannot_be_logged(parts: list[bytes]) -> None:
+    with pytest.raises(ValueError, match=r"\w"):
+        parse(parts)
+
+
 def test_numbers_of_every_numeric_topic() -> None:
     for row in CHANNELS.values():
         count = {"/controller/state": 8}.get(row.topic, len(row.fields) - 1)
