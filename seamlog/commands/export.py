@@ -45,7 +45,8 @@ def export(
 ) -> Outcome:
     """Write topics of SESSION as Parquet, CSV, MATLAB, video or Rerun file.
 
-    Times are log times, as in `seamlog info`. Exit code 1 if something of the session is damaged.
+    Times are log times, as in `seamlog info`. CSV and MATLAB files hold pictures only where their
+    topic is named; export them as video. Exit code 1 if something of the session is damaged.
     """
     from seamlog.session import open_session
 
@@ -114,9 +115,9 @@ def _write(
             raise UsageError("a video shows one topic; export the others on their own")
         topic = topics[0] if topics else IMAGE_TOPIC
         return [(output, write_video(part, topic, output, force), "frames")]
-    wanted = exported_topics(part, topics)
+    wanted = exported_topics(part, topics, pictures=kind in ("parquet", "rerun"))
     if not wanted:
-        raise UsageError(f"{part.path} has no messages in this range")
+        raise UsageError(f"{part.path} has no messages in this range that {kind} could hold")
     if kind in ("mat", "rerun"):
         check_output(output, force)
         return [(output, _whole_writer(kind)(part, wanted, output, force), "values")]

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from seamlog.channels import CHANNELS
+from seamlog.channels import CHANNELS, IMAGE_SCHEMA
 from seamlog.mcap.columns import LOG_TIME, Columns
 from seamlog.session import Session
 
@@ -27,11 +27,18 @@ def iter_parts(session: Session, topic: str) -> Iterator[Columns]:
     yield session.window(start, end).columns(topic)
 
 
-def exported_topics(session: Session, wanted: tuple[str, ...]) -> list[str]:
-    """The topics asked for, else all that have messages in the window."""
+def exported_topics(session: Session, wanted: tuple[str, ...], pictures: bool) -> list[str]:
+    """The topics asked for, else all that have messages in the window.
+
+    Without `pictures`, topics of pictures must be asked for by name.
+    """
     for topic in wanted:
         session.check_topic(topic)
-    return list(wanted) or [row.topic for row in session.info.channels.values() if row.count]
+    return list(wanted) or [
+        row.topic
+        for row in session.info.channels.values()
+        if row.count and (pictures or row.schema != IMAGE_SCHEMA)
+    ]
 
 
 def units_of(session: Session, topic: str) -> dict[str, str]:

@@ -123,6 +123,7 @@ def test_mat_holds_every_value(session_path: Path) -> None:
     assert encoder["stamp_ns"].item().tolist() == wanted["stamp_ns"].tolist()
     assert encoder["position_m"].item().tolist() == wanted["position_m"].tolist()
     assert found["controller_state"]["values"].item().shape == (5, 8)
+    assert "camera_image" not in found
     assert found["events"]["detail"].item().tolist()[:2] == ["=1+1", "-plain"]
     assert str(encoder["units"].item()["position_m"]) == "m"
 
