@@ -7,8 +7,8 @@ from seamlog.analysis.bead.image import make_photo
 from seamlog.analysis.bead.synthetic import Scene
 from seamlog.analysis.surface.blobs import find_blobs
 from seamlog.analysis.surface.spatter import find_spatter
+from seamlog.analysis.surface.synthetic_spatter import matched, spattered
 from seamlog.errors import EvidenceError
-from tests.analysis.surface.spattered import matched, spattered
 
 PLAIN = Scene(noise=2)
 TEXTURED = Scene(noise=2, texture=8, haz=35, gradient=0.4)

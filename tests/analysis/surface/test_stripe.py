@@ -9,12 +9,7 @@ from seamlog.analysis.calibration.laser import calibrate_laser
 from seamlog.analysis.surface.heights import CALIBRATION, heights_part
 from seamlog.analysis.surface.profile import profile_figures
 from seamlog.analysis.surface.stripe import find_stripe
-from seamlog.calibration import PlaneCalibration, rows_of
-from seamlog.errors import EvidenceError, UsageError
-from seamlog.mcap.attachments import Attachment
-from seamlog.recorder import Recorder
-from seamlog.session import open_session
-from tests.analysis.surface.stripes import (
+from seamlog.analysis.surface.synthetic_stripe import (
     HEIGHT_MM,
     MM_PER_PX,
     ROW_OF_ZERO,
@@ -24,6 +19,11 @@ from tests.analysis.surface.stripes import (
     stripe_frame,
     true_z_mm,
 )
+from seamlog.calibration import PlaneCalibration, rows_of
+from seamlog.errors import EvidenceError, UsageError
+from seamlog.mcap.attachments import Attachment
+from seamlog.recorder import Recorder
+from seamlog.session import open_session
 
 X_MM = np.arange(-20.0, 20.0, 0.05)
 

@@ -1,10 +1,14 @@
-"""Rendered laser stripes over a bead of exactly known heights, with gleams and ghosts."""
+"""Rendered laser stripes over a bead of exactly known heights, with gleams and ghosts.
+
+Ghosts are bright pieces of line and spots off the stripe, brighter than the stripe itself.
+"""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 MM_PER_PX = 0.05
+"""Of the frame, across and in height."""
 ROW_OF_ZERO = 0.6
 HEIGHT_MM, WIDTH_MM, STEP_MM, UNDERCUT_MM = 1.5, 8.0, 0.3, 0.25
 

@@ -1,4 +1,4 @@
-"""Spatter on a rendered plate, of exactly known place and size."""
+"""Spatter on a rendered plate, of exactly known place and size, to check how it is found."""
 
 from dataclasses import dataclass, replace
 
@@ -15,7 +15,10 @@ from seamlog.analysis.bead.synthetic import Scene, render
 
 @dataclass(frozen=True)
 class Spattered:
-    """A measured photo and its drops: rows x px, y px, radius px, contrast."""
+    """A measured photo and its drops, rows of x px, y px, radius px, contrast in grey levels.
+
+    `clean` is the same plate without them.
+    """
 
     photo: Photo
     plane: Plane
