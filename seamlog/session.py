@@ -20,7 +20,7 @@ from seamlog.channels import CHANNELS
 from seamlog.errors import ChannelMissing, SessionError, UnknownName
 from seamlog.limits import LIMITS, Limits
 from seamlog.mcap.attachments import Attachments
-from seamlog.mcap.columns import LOG_TIME, STAMP, Columns, by_log_time
+from seamlog.mcap.columns import LOG_TIME, STAMP, Columns, by_log_time, is_in_order
 from seamlog.mcap.file import ENDLESS, McapFile
 from seamlog.mcap.records import ChannelRecord
 from seamlog.migrate import FORMAT, format_of, migrated
@@ -132,14 +132,14 @@ class Session:
         `fields` picks some, `UnknownName` for others. Raises `ChannelMissing`.
         """
         self.check_topic(topic)
-        parts, is_kept = [], False
-        for file in self.files:
-            for row in file.channels(topic):
-                part = self._part(file, row, fields)
-                is_kept |= file.kept_order(row, part, self.span)
-                parts.append(part)
+        rows = [(file, row) for file in self.files for row in file.channels(topic)]
+        parts = [self._part(file, row, fields) for file, row in rows]
+        jumbled = [place for place, part in enumerate(parts) if not is_in_order(part)]
+        if len(parts) == 1 and not jumbled:
+            return parts[0]
         joined = _joined(parts, f"{self.path}: {topic}")
-        return joined if is_kept else by_log_time(joined)
+        kept = [rows[at][0].kept_order(rows[at][1], parts[at], self.span) for at in jumbled]
+        return joined if any(kept) else by_log_time(joined)
 
     def _part(self, file: McapFile, row: ChannelRecord, fields: Sequence[str] | None) -> Columns:
         recording = next((values for name, values in file.metadata if name == RECORDING), {})

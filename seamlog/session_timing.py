@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.channels import CHANNELS
+from seamlog.evenness import Evenness, evenness_of
 from seamlog.mcap.file import McapFile
 from seamlog.mcap.message_index import read_message_index
 from seamlog.mcap.records import ChunkEntry
@@ -23,20 +24,16 @@ RECORDER = CHANNELS["/seamlog/recorder"]
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Evenness of a topic by log times; figures are None where there are too few messages.
+    """Log times and bytes of a topic; None where there are too few messages.
 
-    A gap is a step above 1.5 usual periods (the median); jitter is half the range that 90 % of the
-    other steps lie in. `size_bytes` counts unpacked messages with their record heads.
+    `size_bytes` counts unpacked messages with their record heads.
     """
 
-    start_ns: int | None
-    end_ns: int | None
+    start_ns: int
+    end_ns: int
     rate_hz: float | None
-    period_s: float | None
-    jitter_s: float | None
-    gaps: int | None
-    longest_gap_s: float | None
     size_bytes: int
+    evenness: Evenness | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,25 +90,9 @@ def _unindexed(file: McapFile, entry: ChunkEntry) -> Iterator[tuple[int, NDArray
 
 def _timing(times: NDArray[np.int64], size: int) -> Timing:
     times = np.sort(times)
-    steps = np.diff(times)
     start, end = int(times[0]), int(times[-1])
-    if len(steps) < 2 or not steps.any():
-        rate = len(steps) * 1e9 / (end - start) if end > start else None
-        return Timing(start, end, rate, None, None, None, None, size)
-    period = float(np.median(steps[steps > 0]))
-    gaps = steps > 1.5 * period
-    usual = steps[~gaps]
-    low, high = np.percentile(usual, (5, 95)) if len(usual) else (period, period)
-    return Timing(
-        start_ns=start,
-        end_ns=end,
-        rate_hz=len(steps) * 1e9 / (end - start),
-        period_s=period * 1e-9,
-        jitter_s=float(high - low) / 2e9,
-        gaps=int(gaps.sum()),
-        longest_gap_s=float(steps.max()) * 1e-9,
-        size_bytes=size,
-    )
+    rate = (len(times) - 1) * 1e9 / (end - start) if end > start else None
+    return Timing(start, end, rate, size, evenness_of(times))
 
 
 def accounts(session: "Session") -> dict[str, Account]:

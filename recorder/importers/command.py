@@ -15,6 +15,8 @@ from seamlog.outcome import Outcome
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from seamlog.evenness import Evenness
+
     from .content import Content
     from .conversion import Loss, TopicColumns
 
@@ -221,7 +223,7 @@ def _outcome(
         head,
         f"{loss.rows} rows, {seconds:.3f} s from {_date(first_ns)}, topics {', '.join(topics)}",
     ]
-    lines += [f"{topic}: {timing}" for topic, timing in loss.timing.items()]
+    lines += [f"{topic}: {_timing_text(timing)}" for topic, timing in loss.timing.items()]
     if loss.not_imported:
         lines.append(f"not imported: {', '.join(loss.not_imported)}")
     lines += [f"absent in {topic}: {', '.join(names)}" for topic, names in loss.absent.items()]
@@ -241,6 +243,14 @@ def _outcome(
         "notes": loss.notes,
     }
     return Outcome("seamlog.import", "\n".join(lines), document)
+
+
+def _timing_text(timing: "Evenness") -> str:
+    text = f"period {timing.period_s * 1e3:.4g} ms, jitter {timing.jitter_s * 1e3:.3g} ms"
+    if timing.gaps:
+        text += f", {timing.gaps} gap{'s' if timing.gaps > 1 else ''}"
+        text += f", the longest {timing.longest_gap_s:.4g} s"
+    return text + (f", {timing.repeated} times repeated" if timing.repeated else "")
 
 
 def _date(time_ns: int) -> str:

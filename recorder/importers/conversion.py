@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from seamlog.channels import STAMP, Channel, Field
 from seamlog.errors import ImportFailed
+from seamlog.evenness import Evenness, evenness_of
 
 from .column_map import (
     FREE,
@@ -53,51 +54,8 @@ class Loss:
     not_imported: list[str]
     absent: dict[str, list[str]] = field(default_factory=dict)
     missing_values: dict[str, int] = field(default_factory=dict)
-    timing: dict[str, "Timing"] = field(default_factory=dict)
+    timing: dict[str, Evenness] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Timing:
-    """How even the times of a topic are: its usual period, and where it is not kept.
-
-    `gaps` counts steps above 1.5 periods; `jitter_s` is half the range that 90 % of the other
-    steps lie in.
-    """
-
-    rows: int
-    period_s: float
-    jitter_s: float
-    gaps: int
-    longest_gap_s: float
-    repeated: int
-
-    def __str__(self) -> str:
-        text = f"{self.rows} rows, period {self.period_s * 1e3:.4g} ms"
-        text += f", jitter {self.jitter_s * 1e3:.3g} ms"
-        if self.gaps:
-            text += f", {self.gaps} gaps, the longest {self.longest_gap_s:.4g} s"
-        return text + (f", {self.repeated} times repeated" if self.repeated else "")
-
-
-def timing_of(stamp_ns: NDArray[np.int64]) -> Timing | None:
-    """Evenness of increasing times; None for fewer than three."""
-    steps = np.diff(stamp_ns)
-    real = steps[steps > 0]
-    if len(real) < 2:
-        return None
-    period = float(np.median(real))
-    gaps = real > 1.5 * period
-    usual = real[~gaps]
-    low, high = np.percentile(usual, (5, 95)) if len(usual) else (period, period)
-    return Timing(
-        rows=len(stamp_ns),
-        period_s=period * 1e-9,
-        jitter_s=float(high - low) / 2e9,
-        gaps=int(gaps.sum()),
-        longest_gap_s=float(real.max()) * 1e-9,
-        repeated=int((steps == 0).sum()),
-    )
 
 
 def convert(
@@ -116,7 +74,7 @@ def convert(
         channel = channel_of(topic, entry)
         stamp_ns = _stamps(columns, _time_of(topic, entry, mapping, times or {}, path), entry, path)
         loss.rows = max(loss.rows, len(stamp_ns))
-        timing = timing_of(stamp_ns)
+        timing = evenness_of(stamp_ns)
         if timing:
             loss.timing[topic] = timing
         values = _fields(columns, channel, entry, stamp_ns, path)

@@ -90,7 +90,9 @@ def _figures(
 ) -> dict[str, Any]:
     found: dict[str, Any] = {"rate_hz": channel.rate_hz}
     if channel.topic in timing:
-        found |= asdict(timing[channel.topic])
+        known = asdict(timing[channel.topic])
+        found |= {name: value for name, value in known.items() if name != "evenness"}
+        found |= known["evenness"] or {}
     if channel.topic in account:
         found["account"] = asdict(account[channel.topic])
     return found
@@ -168,28 +170,26 @@ def _channel(channel: "ChannelInfo", start_ns: int, timing: "Timing | None") -> 
     name = channel.schema or channel.encoding
     if timing is None:
         return (channel.topic, name, str(channel.count), *[""] * (len(_HEAD) - 3))
+    even = timing.evenness
     # a message now and then has no period that it could miss
-    steady = timing.gaps is not None and timing.gaps * 10 < channel.count
+    if even is None or even.gaps * 10 >= channel.count:
+        steady = ("", "", "")
+    else:
+        steady = (f"{even.jitter_s * 1e3:.3g}", str(even.gaps), f"{even.longest_gap_s:.4g}")
     return (
         channel.topic,
         name,
         str(channel.count),
-        _shown(timing.rate_hz, "{:.4g}"),
+        "" if timing.rate_hz is None else f"{timing.rate_hz:.4g}",
         _seconds(timing.start_ns, start_ns),
         _seconds(timing.end_ns, start_ns),
-        _shown(timing.jitter_s, "{:.3g}", 1e3) if steady else "",
-        str(timing.gaps) if steady else "",
-        _shown(timing.longest_gap_s, "{:.4g}") if steady else "",
+        *steady,
         _size(timing.size_bytes),
     )
 
 
-def _shown(value: float | None, form: str, scale: float = 1.0) -> str:
-    return "" if value is None else form.format(value * scale)
-
-
-def _seconds(time_ns: int | None, start_ns: int) -> str:
-    return "" if time_ns is None else f"{(time_ns - start_ns) / 1e9:.3f}"
+def _seconds(time_ns: int, start_ns: int) -> str:
+    return f"{(time_ns - start_ns) / 1e9:.3f}"
 
 
 def _dropped(account: "Account | None") -> str:

@@ -182,10 +182,15 @@ def _missing(room: NDArray[Any]) -> Any:
     return None if room.dtype == object else np.nan
 
 
+def is_in_order(columns: Columns) -> bool:
+    """Whether log times never fall back."""
+    times = columns[LOG_TIME]
+    return bool((times[1:] >= times[:-1]).all())
+
+
 def by_log_time(columns: Columns) -> Columns:
     """Sorted by log time, ties in file order."""
-    times = columns[LOG_TIME]
-    if len(times) < 2 or (times[1:] >= times[:-1]).all():
+    if is_in_order(columns):
         return columns
-    order = np.argsort(times, kind="stable")
+    order = np.argsort(columns[LOG_TIME], kind="stable")
     return {name: column[order] for name, column in columns.items()}
