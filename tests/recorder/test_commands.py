@@ -244,3 +244,14 @@ def test_sources_says_what_can_be_recorded(lab: Lab) -> None:
     for arguments in (["sources", "--json"], ["sources", "list", "--json"]):
         rows: list[dict[str, Any]] = json.loads(lab.run(*arguments)[1])["sources"]
         assert {row["name"]: row["available"] for row in rows}["broken"] is False
+
+
+def test_a_clean_recording_is_compacted_on_demand(lab: Lab) -> None:
+    code, output, _ = lab.record("table", "--compact", "--set", "source.count=300")
+    assert code == 0
+    assert "weld.compact.mcap: in large chunks" in output
+    one, other = (read_session(lab.folder / name) for name in ("weld.mcap", "weld.compact.mcap"))
+    assert one["/table/encoder"] == other["/table/encoder"]
+    code, _, errors = lab.record("table", "--compact")
+    assert code == 2
+    assert "there already" in errors
