@@ -35,24 +35,31 @@ def compare(
     title: str | None,
     force: bool,
 ) -> Outcome:
-    """Set RESULTS directories beside the first of them; exit code 1 if one is worse."""
-    from seamlog.errors import UsageError
+    """Set RESULTS directories beside the first of them; exit code 1 if one is worse.
+
+    Of one directory alone its replays are set beside the recorded run.
+    """
+    from tempfile import TemporaryDirectory
+
     from seamlog.files import check_output
     from seamlog.results import Results, Verdict
 
     from .compare_report import compare_report, markdown, summary
     from .comparison import compare_runs, read_tolerances
+    from .replayed import replays_of
     from .run import Run
 
-    if len(results) < 2:
-        raise UsageError("compare needs two results directories or more; the first is the base")
     if output is not None:
         check_output(output, force)
     asked = read_tolerances(tolerances)
-    runs = [Run(Results.open(folder), number) for number, folder in enumerate(results)]
-    comparison = compare_runs(runs, asked)
-    if output is not None:
-        compare_report(runs, comparison, title, day_of(date)).write(output, force)
+    opened = [Results.open(folder) for folder in results]
+    with TemporaryDirectory() as folder:
+        if len(opened) == 1:
+            opened = replays_of(opened[0], Path(folder))
+        runs = [Run(each, number) for number, each in enumerate(opened)]
+        comparison = compare_runs(runs, asked)
+        if output is not None:
+            compare_report(runs, comparison, title, day_of(date)).write(output, force)
     lines = [f"{comparison.verdict.value}: {summary(comparison)}"]
     lines += [f"  {text}" for text in (*comparison.regressions, *comparison.unknown)]
     document: dict[str, Any] = {

@@ -175,6 +175,23 @@ def test_the_command_writes_page_markdown_and_json(
     assert "<b>" not in capsys.readouterr().out
 
 
-def test_one_directory_is_not_enough(sample: Results, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["compare", str(sample.folder)]) == 2
-    assert "the first is the base" in capsys.readouterr().err
+def test_one_directory_without_replays_is_not_enough(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _results(tmp_path / "a")
+    assert run(["compare", str(tmp_path / "a")]) == 2
+    assert "or one with replays" in capsys.readouterr().err
+
+
+def test_replays_of_one_session_are_set_beside_the_record(
+    sample: Results, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the sample the replayed pd has 2.4 times the recorded error, the paper's law 0.9."""
+    words = ["compare", str(sample.folder), "--json", "-o", str(tmp_path / "c.html")]
+    assert run(words) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["labels"] == ["recorded", "paper", "pd"]
+    assert all("pd" in text and "paper" not in text for text in told["regressions"])
+    means = {item["run"]: item for item in told["paired"] if item["column"] == "error_mm"}
+    assert means["paper"]["high"] < 0 < means["pd"]["low"]
+    assert "recorded" in (tmp_path / "c.html").read_text()
