@@ -113,7 +113,7 @@ function extentOf(u, columns) {
   let low = Infinity, high = -Infinity;
   for (const column of columns) {
     if (column instanceof Float64Array) {
-      const [least, most] = extremesOf(column, blocksFor(column), first, last + 1);
+      const [least, most] = extremesOf(column, levelsFor(column), first, last + 1);
       low = Math.min(low, least);
       high = Math.max(high, most);
       continue;

@@ -25,11 +25,11 @@ DENSE = 40_000
 TIME = "0/time"
 COLUMNS = """([xs, ys, min, max, width]) => {
     SOURCE;
-    const blocks = blocksOf(ys);
+    const levels = levelsOf(ys);
     let first = firstAtLeast(xs, min, 0, xs.length);
     let last = firstAtLeast(xs, max, first, xs.length) - 1;
     const found = [];
-    eachColumn(xs, ys, blocks, first, last, min, max, width, (...column) => found.push(column));
+    eachColumn(xs, ys, levels, first, last, min, max, width, (...column) => found.push(column));
     return JSON.stringify([first, last, found]);
 }"""
 INK = """([id, value, at]) => {
