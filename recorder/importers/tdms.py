@@ -56,7 +56,7 @@ def _add(name: str, channel: Any, columns: dict[str, NDArray[Any]], content: Con
     unit = channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription")
     if unit:
         content.units[name] = str(unit)
-    times = _times(channel, len(values))
+    times = _times(name, channel, len(values), content.notes)
     if times is None:
         return
     for other, column in columns.items():
@@ -68,7 +68,7 @@ def _add(name: str, channel: Any, columns: dict[str, NDArray[Any]], content: Con
     content.units[f"{name} time"] = "ns"
 
 
-def _times(channel: Any, count: int) -> NDArray[np.int64] | None:
+def _times(name: str, channel: Any, count: int, notes: list[str]) -> NDArray[np.int64] | None:
     properties = channel.properties
     step = properties.get("wf_increment")
     if not isinstance(step, int | float) or not step > 0:
@@ -77,6 +77,10 @@ def _times(channel: Any, count: int) -> NDArray[np.int64] | None:
     start_ns = 0
     if isinstance(start, np.datetime64):
         start_ns = int(start.astype("datetime64[ns]").view(np.int64))
+    if start_ns <= 0:
+        # LabVIEW writes 1904 where nobody set a start
+        notes.append(f"channel {name} does not say when it began: its time counts from 1970")
+        start_ns = 0
     start_ns += round(float(properties.get("wf_start_offset", 0.0)) * 1e9)
     if start_ns + count * step * 1e9 >= 2**63:
         return None

@@ -14,6 +14,8 @@ from seamlog.messages import definition, encode_image
 
 TOPIC = "/camera/image"
 _QUALITY = 95
+_BARE = ("mjpeg", "h264", "hevc", "m4v", "mpegvideo", "image2", "jpeg_pipe", "png_pipe")
+"""Formats of pictures in a row, without times."""
 
 
 class VideoImporter:
@@ -43,6 +45,11 @@ def _copy(container: Any, path: Path, writer: BatchWriter) -> list[str]:
         raise ImportFailed(f"{path} has no video stream")
     stream = container.streams.video[0]
     start_ns, notes = _start(container, stream)
+    if container.format.name in _BARE:
+        notes.append(
+            f"a bare {container.format.name} stream has no time stamps: {stream.average_rate} "
+            "frames per second were assumed"
+        )
     channel = CHANNELS[TOPIC]
     schema = Schema(0, channel.schema, "ros2msg", definition(channel).encode())
     out = writer.stream(TOPIC, schema, metadata={"source": path.name})

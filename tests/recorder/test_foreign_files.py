@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import av
+import cv2
 import h5py
 import numpy as np
 import pyarrow as pa
@@ -169,6 +170,26 @@ def test_waveforms_of_tdms_bring_time_and_unit(tmp_path: Path) -> None:
         encoder = session.columns("/table/encoder")
     np.testing.assert_allclose(encoder["position_m"], np.arange(4) / 1000)
     assert encoder["stamp_ns"][0] == start_ns
+
+
+def test_a_waveform_without_start_says_so(tmp_path: Path) -> None:
+    wave = {"wf_start_time": np.datetime64("1904-01-01", "us"), "wf_increment": 0.5}
+    with TdmsWriter(tmp_path / "x.tdms") as writer:
+        writer.write_segment([ChannelObject("g", "c", np.arange(3.0), properties=wave)])
+    content = TdmsImporter().load(tmp_path / "x.tdms")
+    assert content.columns["g/c time"].tolist() == [0, 500_000_000, 1_000_000_000]
+    assert any("does not say when" in note for note in content.notes)
+
+
+def test_pictures_without_times_are_said(tmp_path: Path, capsys: Any) -> None:
+    pictures = b"".join(
+        cv2.imencode(".jpg", np.full((48, 64, 3), level, np.uint8))[1].tobytes()
+        for level in (0, 90)
+    )
+    (tmp_path / "x.mjpeg").write_bytes(pictures)
+    imported(tmp_path / "x.mjpeg", "--json")
+    notes = json.loads(capsys.readouterr().out)["notes"]
+    assert any("were assumed" in note for note in notes)
 
 
 def test_matlab_73_is_read(tmp_path: Path) -> None:
