@@ -65,12 +65,17 @@ class Recovery:
     problems: list[str] = field(default_factory=list)
     rings: Path | None = None
     end_known: bool = True
-    """The file's own summary or the rings tell how much there was."""
+    """The file reaches its own end, or summary or rings tell how much there was."""
 
     @property
     def is_complete(self) -> bool:
-        """Nothing is missing, as far as anything tells."""
-        return not self.problems and not any(row.lost for row in self.channels)
+        """Nothing is missing, and that is known."""
+        return self.end_known and not self.has_losses
+
+    @property
+    def has_losses(self) -> bool:
+        """Something is known to be missing."""
+        return bool(self.problems) or any(row.lost for row in self.channels)
 
 
 def default_output(path: Path) -> Path:
@@ -210,7 +215,7 @@ class _Recovery:
     def _count(self, accounts: dict[int, Account]) -> None:
         """How many of each channel are lost, by summary, accounts or sequences."""
         index = self._index
-        self.result.end_known = bool(index.expected or accounts)
+        self.result.end_known = bool(index.expected or accounts) or index.reaches_end
         for number, row in sorted(self._rows.items()):
             self.result.channels.append(row)
             if number in index.expected:
@@ -243,7 +248,7 @@ class _Recovery:
             file.add_metadata(END, {"ending": "loop and recorder died"})
         elif END not in names and RECORDING in names:
             file.add_metadata(END, {"ending": "the end of the file is missing"})
-        if not self.result.is_complete:
+        if self.result.has_losses:
             lost = [f"{row.topic}: {row.lost} lost" for row in self.result.channels if row.lost]
             texts = [*self.result.problems, *lost]
             file.add_metadata(PROBLEMS, {f"{i:03d}": text for i, text in enumerate(texts[:200])})

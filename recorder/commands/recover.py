@@ -19,7 +19,7 @@ def recover(session: Path, output: Path | None, force: bool) -> Outcome:
     """Save what is left of the file SESSION, and what its recorder still held in memory.
 
     SESSION is never changed. Only bytes that their CRC proves count; the result is read back by
-    a second reader. Exit code 1 if something is lost.
+    a second reader. Exit code 1 if something is lost, or may be.
     """
     from seamlog.recorder.recovery import recover as run
 
@@ -28,6 +28,7 @@ def recover(session: Path, output: Path | None, force: bool) -> Outcome:
         "input": str(found.source),
         "output": str(found.output),
         "is_complete": found.is_complete,
+        "end_known": found.end_known,
         "rings": None if found.rings is None else str(found.rings),
         "channels": [asdict(row) for row in found.channels],
         "problems": found.problems,
@@ -51,7 +52,10 @@ def _text(found: "Recovery") -> str:
             "Nothing tells what came after the end of the file: 0.1 s at most where the recorder "
             "died, any amount where a copy was cut."
         )
-    lines.append("Complete: nothing is missing." if found.is_complete else "Some of it is lost.")
+    if found.is_complete:
+        lines.append("Complete: nothing is missing.")
+    elif found.has_losses:
+        lines.append("Some of it is lost.")
     return "\n".join(lines)
 
 

@@ -38,6 +38,8 @@ class FileIndex:
     """Bytes from and to that hold nothing whole, where the file had to be walked over."""
     left_out: list[tuple[int, int, str]] = field(default_factory=list)
     """Offset, length and fault of damaged records that a walk left out."""
+    reaches_end: bool = False
+    """A walk came to the record that ends the data: nothing was cut off."""
     expected: dict[int, int] = field(default_factory=dict)
     """Channel id to the number of messages that a proved summary counts."""
     summary_start: int | None = None

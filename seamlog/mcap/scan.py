@@ -125,6 +125,7 @@ class _Scanner:
         try:
             for opcode, offset, length in walk(source.data, at, source.size):
                 if _ENDS.get(opcode) == length - _HEAD:
+                    self.index.reaches_end = True
                     self._close_chunk()
                     self._close_bare(offset)
                     return None

@@ -56,13 +56,13 @@ def bomb_that_says_so(path: Path) -> None:
 
 @hostile
 def bomb_that_lies_zstd(path: Path) -> None:
-    body = zstandard.ZstdCompressor(write_content_size=False).compress(bytes(1 << 30))
+    body = zstandard.ZstdCompressor(write_content_size=False).compress(bytes(400 << 20))
     path.write_bytes(file_of(chunk(body, 1000, 1, "zstd")))
 
 
 @hostile
 def bomb_that_lies_lz4(path: Path) -> None:
-    body = lz4.frame.compress(bytes(512 << 20), store_size=False)
+    body = lz4.frame.compress(bytes(300 << 20), store_size=False)
     path.write_bytes(file_of(chunk(body, 1000, 1, "lz4")))
 
 

@@ -73,8 +73,7 @@ def kept_by_recovery(path: Path, original: Original) -> float:
     assert path.read_bytes() == before
     with seamlog.open_session(output) as session:
         rows = rows_of(session)
-    said = not found.is_complete or not found.end_known
-    return fraction(rows, said, original)
+    return fraction(rows, not found.is_complete, original)
 
 
 def fraction(rows: Rows, is_said: bool, original: Original) -> float:

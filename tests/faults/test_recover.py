@@ -130,6 +130,16 @@ def test_messages_outside_chunks_stay_unsigned(tmp_path: Path) -> None:
     np.testing.assert_array_equal(columns["position_m"], expected_m)
 
 
+def test_a_cut_between_two_chunks_is_no_success(live: Path) -> None:
+    entry = entries(live)[6]
+    live.write_bytes(live.read_bytes()[: entry.offset])
+    found = recover(live)
+    assert not found.has_losses
+    assert not found.end_known
+    assert not found.is_complete
+    assert run(["recover", str(live), "--force"]) == 1
+
+
 def test_a_foreign_recording_keeps_its_profile(tmp_path: Path) -> None:
     path = tmp_path / "x.mcap"
     write_foreign(path, {}, 300)
