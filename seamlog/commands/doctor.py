@@ -48,7 +48,7 @@ def examine(session: "Session") -> "Iterator[Finding]":
 
     courses = Courses()
     for file in session.files:
-        frame = Examination(file.source, session.limits)
+        frame = Examination(file.source, file.index, session.limits)
         yield from frame.iter_findings()
         yield from ChunkExamination(frame, courses).iter_findings()
     yield from iter_account_findings(session, courses)

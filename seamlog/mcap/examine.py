@@ -13,7 +13,7 @@ from seamlog.findings import Finding, Severity
 from seamlog.limits import Limits
 from seamlog.mcap import records
 from seamlog.mcap.attachments import read_attachment
-from seamlog.mcap.index import FileIndex, load_index
+from seamlog.mcap.index import FileIndex
 from seamlog.mcap.records import ChunkEntry
 from seamlog.mcap.salvage import proved_summary
 from seamlog.mcap.scan import scan
@@ -26,12 +26,11 @@ _DATA_END_BYTES = records.RECORD_HEAD.size + 4
 class Examination:
     """One file: what its summary tells, what a walk finds, and how the two differ.
 
-    Raises `SessionError` or `LimitExceeded` as opening does.
+    `told` is what opening the file gave. Raises `SessionError` or `LimitExceeded` as that does.
     """
 
-    def __init__(self, source: FileSource, limits: Limits) -> None:
-        self.source, self.limits = source, limits
-        self.told = load_index(source, limits)
+    def __init__(self, source: FileSource, told: FileIndex, limits: Limits) -> None:
+        self.source, self.told, self.limits = source, told, limits
         self.found = scan(source, "", limits) if self.told.summary_start else self.told
         self.is_living = is_being_written(source.path)
 

@@ -20,6 +20,9 @@ from seamlog.mcap.records import (
 )
 from seamlog.mcap.source import FileSource
 
+_LEAST_CHUNK_BYTES = 49
+"""Head, times, sizes and CRC of an empty chunk."""
+
 
 @dataclass(slots=True)
 class FileIndex:
@@ -145,8 +148,11 @@ def _read_summary(source: FileSource, start: int, index: FileIndex, limits: Limi
     stored = parsing.Cursor(data, source.size - len(records.MAGIC) - 4).u32()
     if stored and crc32(data[start : source.size - len(records.MAGIC) - 4]) != stored:
         raise Malformed("its CRC is wrong")
+    most_chunks = start // _LEAST_CHUNK_BYTES
     for opcode, offset, length in walk(data, start, end):
         index.learn(opcode, data[offset + records.RECORD_HEAD.size : offset + length])
+        if len(index.chunks) > most_chunks:
+            raise Malformed("its index lists more chunks than fit into the file")
     _check_entries(source, index.chunks)
     most = limits.chunk_bytes
     check_expansion(source, sum(min(row.uncompressed_size, most) for row in index.chunks), limits)

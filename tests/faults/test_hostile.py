@@ -16,7 +16,7 @@ NAMED = {
     "bomb_that_lies_zstd": "more bytes than the 1000",
     "bomb_that_lies_lz4": "more bytes than the 1000",
     "many_bombs": "limit expansion",
-    "index_of_one_chunk_many_times": "overlaps another",
+    "index_of_one_chunk_many_times": "more chunks than fit",
     "strings_of_four_gigabytes": "bytes wanted",
     "sequence_of_four_billion": "does not fit its definition",
     "definition_that_holds_itself": "nested more than",
