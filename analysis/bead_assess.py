@@ -9,7 +9,7 @@ from seamlog.results import Input, Part, input_of
 
 from .bead.assess import AssessedPhoto, assess_photos
 from .bead.part import BeadConfig, Pictures, Tables
-from .bead.sources import attached_photos, photo_files
+from .bead.sources import attached_photos, logged_seam_mm, photo_files
 from .inspection import InspectionSettings, inspect_photos, stitched
 from .join_part import join_part, no_join
 from .quality.part import QualityConfig
@@ -41,7 +41,7 @@ def bead_and_join(
     if not sources:
         return profiles
     only = welds[0].number if len(welds) == 1 else None
-    assessed = assess_photos(sources, start, settled, only)
+    assessed = assess_photos(sources, start, settled, only, logged_seam_mm(session))
     inputs = [input_of(path) for path in session.paths]
     whole = stitched(assessed, settled) if len(welds) == 1 else ""
     if isinstance(whole, AssessedPhoto):

@@ -78,7 +78,10 @@ def join_part(
             "correlations": _correlations(columns),
         },
     )
-    return part, {"stations": (columns, _units(session))}
+    tables: Tables = {"stations": (columns, _units(session))}
+    if rows := part.details["correlations"]:
+        tables["correlations"] = _correlation_table(rows)
+    return part, tables
 
 
 def no_join(reason: str, weld: "Weld | None", inputs: Sequence[Input]) -> Part:
@@ -189,6 +192,19 @@ def _cause_details(
             for cause in causes
         ],
     }
+
+
+def _correlation_table(
+    rows: list[dict[str, Any]],
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Which channel the width goes along with, and how far behind it; the closest first."""
+    ordered = sorted(rows, key=lambda row: -abs(row["r"]))
+    columns = {
+        "channel": np.array([_CHANNELS[row["channel"]][0] for row in ordered], dtype=object),
+        "correlation": np.array([row["r"] for row in ordered]),
+        "lag_mm": np.array([row["lag_mm"] for row in ordered]),
+    }
+    return columns, {"correlation": "1", "lag_mm": "mm"}
 
 
 def _correlations(columns: dict[str, NDArray[Any]]) -> list[dict[str, Any]]:

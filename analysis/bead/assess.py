@@ -9,6 +9,7 @@ from seamlog.results import Figure, Part, Verdict
 
 from .measurement import TRUSTED
 from .part import BeadConfig, BeadResult, Pictures, Tables, bead_part, measure_photo
+from .plane import Points
 from .sources import PhotoSource
 
 
@@ -61,20 +62,26 @@ def assess_photos(
     start: str | None = None,
     config: BeadConfig | None = None,
     weld: int | None = None,
+    seam_mm: Points | None = None,
 ) -> list[AssessedPhoto]:
     """Part `bead` of each photo, indexed in order; a refused photo keeps its place."""
     return [
-        _assess(source, start, config or BeadConfig(), index, weld)
+        _assess(source, start, config or BeadConfig(), index, weld, seam_mm)
         for index, source in enumerate(sources, 1)
     ]
 
 
 def _assess(
-    source: PhotoSource, start: str | None, config: BeadConfig, index: int, weld: int | None
+    source: PhotoSource,
+    start: str | None,
+    config: BeadConfig,
+    index: int,
+    weld: int | None,
+    seam_mm: Points | None,
 ) -> AssessedPhoto:
     name = source.photo.name
     try:
-        result = measure_photo(source.photo, source.calibration, start, config)
+        result = measure_photo(source.photo, source.calibration, start, config, seam_mm)
     except (EvidenceError, ImageError) as error:
         part = _refused(source, config, index, weld, str(error))
         return AssessedPhoto(part, {}, {}, None, error, name)

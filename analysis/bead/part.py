@@ -1,7 +1,9 @@
 """The bead as a part of the results: figures, criteria, findings, stations, overlay."""
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -9,6 +11,7 @@ from pydantic import BaseModel, ConfigDict
 from seamlog.analysis.quality.judge import judge
 from seamlog.analysis.quality.stations import doubt, station_criterion
 from seamlog.calibration import Calibration
+from seamlog.errors import EvidenceError
 from seamlog.plugins import load
 from seamlog.results import (
     Columns,
@@ -27,7 +30,7 @@ from seamlog.results import (
 from .image import Photo
 from .measurement import END, BeadDetector, BeadMeasurement
 from .overlay import overlay_webp
-from .plane import Plane, plane_of
+from .plane import Plane, Points, plane_of
 from .uniformity import Uniformity, uniformity
 
 Tables = Mapping[str, tuple[Columns, Mapping[str, str]]]
@@ -53,6 +56,7 @@ class BeadResult:
     measurement: BeadMeasurement
     uniformity: Uniformity | None
     plane: Plane | None = None
+    calibration: Calibration | None = None
 
 
 def measure_photo(
@@ -60,17 +64,25 @@ def measure_photo(
     calibration: Calibration | None = None,
     start: str | None = None,
     config: BeadConfig | None = None,
+    seam_mm: Points | None = None,
 ) -> BeadResult:
     """Measure the bead in a photo with the configured detector.
 
-    `start` tells at which end of the photo the weld began: left, right, top or bottom. Raises
-    `EvidenceError` (no bead to be told), `ImageError`, `CalibrationError`, `UnknownName`.
+    `start` tells at which end of the photo the weld began: left, right, top or bottom. `seam_mm`
+    is the logged path of the seam in the table frame, (n, 2): a photo in that frame is searched
+    along it first. Raises `EvidenceError` (no bead to be told), `ImageError`, `CalibrationError`,
+    `UnknownName`.
     """
     config = config or BeadConfig()
     detector: BeadDetector = load("seamlog.bead_detectors", config.detector)
     plane = plane_of(photo, calibration)
-    measurement = detector(photo, plane, start=start)
-    return BeadResult(photo, measurement, uniformity(measurement), plane)
+    measurement = None
+    if seam_mm is not None and plane.in_table_frame:
+        with contextlib.suppress(EvidenceError):
+            measurement = detector(photo, plane, seam_mm, start)
+    if measurement is None:
+        measurement = detector(photo, plane, start=start)
+    return BeadResult(photo, measurement, uniformity(measurement), plane, calibration)
 
 
 def bead_part(
@@ -105,9 +117,18 @@ def bead_part(
             "open_stop": m.open_stop,
             "photo_width_px": result.photo.width_px,
             "photo_height_px": result.photo.height_px,
+            **_calibrated(result.calibration),
         },
     )
     return part, {"stations": _stations(m)}, {"overlay": _picture(result)}
+
+
+def _calibrated(calibration: Calibration | None) -> dict[str, Any]:
+    """What the inspection record says of the calibration."""
+    if calibration is None:
+        return {}
+    told = {"kind", "source", "date", "residual_mm", "scale_relative_u"}
+    return {"calibration": calibration.model_dump(mode="json", include=told)}
 
 
 def _stations(m: BeadMeasurement) -> tuple[Columns, Mapping[str, str]]:

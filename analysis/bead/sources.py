@@ -4,16 +4,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from seamlog.calibration import Calibration, load_calibration, parse_calibration
 from seamlog.errors import InputError
 from seamlog.results import Input, input_of
 
 from .image import Photo, decode_photo, load_photo
+from .plane import Points
 
 if TYPE_CHECKING:
     from seamlog.session import Session
 
 PHOTO, CALIBRATION = "photo/", "calibration/"
+PATH = "/seam/path"
 _SUFFIX = ".calibration.json"
 
 
@@ -45,6 +49,15 @@ def _from_file(path: Path, calibration: Path | None) -> PhotoSource:
         raise InputError(f"{calibration}: no such calibration file; check the name")
     inputs.append(input_of(calibration))
     return PhotoSource(photo, load_calibration(calibration), tuple(inputs))
+
+
+def logged_seam_mm(session: "Session") -> Points | None:
+    """The last path of the seam in the log, table frame, shape (n, 2); None without one."""
+    if PATH not in session.info.channels or not session.info.channels[PATH].count:
+        return None
+    logged = session.columns(PATH)
+    x, y = (1e3 * np.asarray(logged[name][-1], dtype=np.float64) for name in ("x_m", "y_m"))
+    return np.column_stack([x, y]) if 1 < len(x) == len(y) else None
 
 
 def attached_photos(session: "Session", calibration: Path | None = None) -> list[PhotoSource]:

@@ -14,6 +14,7 @@ from .bead_synth import synth
 
 if TYPE_CHECKING:
     from seamlog.analysis.bead.assess import AssessedPhoto
+    from seamlog.analysis.bead.plane import Points
     from seamlog.analysis.inspection import Inspected
     from seamlog.results import Columns
 
@@ -78,7 +79,7 @@ def measure(
     earlier = load_photo(before) if before else None
     profiles = _profiles(session, weld)
     sources = _sources(photos, session, calibration)
-    assessed = assess_photos(sources, start, settled, weld)
+    assessed = assess_photos(sources, start, settled, weld, _seam_mm(session))
     whole = stitched(assessed, settled)
     if isinstance(whole, AssessedPhoto):
         assessed = [*assessed, whole]
@@ -129,6 +130,16 @@ def _profiles(session: Path | None, number: int | None) -> "Inspected | None":
     with open_session(session) as opened:
         welds = chosen_welds(opened, number)
         return heights_part(opened, welds[0] if len(welds) == 1 else None)
+
+
+def _seam_mm(session: Path | None) -> "Points | None":
+    from seamlog.analysis.bead.sources import logged_seam_mm
+    from seamlog.session import open_session
+
+    if session is None:
+        return None
+    with open_session(session) as opened:
+        return logged_seam_mm(opened)
 
 
 def _write(output: Path, parts: list["Inspected"]) -> None:

@@ -11,8 +11,10 @@ import pytest
 
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead_assess import bead_and_join
+from seamlog.analysis.calibration.table import calibrate_table
 from seamlog.analysis.registration import tie_bead
 from seamlog.analysis.torch_path import TorchPath
+from seamlog.analysis.virtual_cell.bead_photo import _CORNERS_MM, _CORNERS_PX
 from seamlog.calibration import PlaneCalibration, load_calibration, rows_of
 from seamlog.cli import run
 from seamlog.errors import EvidenceError
@@ -165,3 +167,22 @@ def test_a_bead_without_calibration_is_not_assessed(
 
 def test_without_photos_there_is_no_bead(session: Session) -> None:
     assert bead_and_join(session, session.welds) == []
+
+
+def test_a_photo_in_the_table_frame_is_searched_along_the_logged_seam(
+    session: Session, weld: Path, tmp_path: Path
+) -> None:
+    """The same photo, its plane tied to the table by three points of known place."""
+    photo = tmp_path / "tied.jpg"
+    photo.write_bytes(weld.with_name("weld.bead.jpg").read_bytes())
+    plane = load_calibration(weld.with_name("weld.bead.calibration.json"))
+    assert isinstance(plane, PlaneCalibration)
+    px, mm = np.array(_CORNERS_PX), np.array(_CORNERS_MM)
+    tied = calibrate_table(plane, px, mm).calibration
+    photo.with_suffix(".calibration.json").write_text(tied.model_dump_json(by_alias=True))
+    *_, (join, tables, _) = bead_and_join(session, session.welds, (photo,))
+    assert "table frame" in join.details["method"]
+    assert join.details["u_s_mm"] < 1
+    assert join.details["causes"][0]["channel"] == "weld_speed"
+    closest = tables["correlations"][0]["channel"][0]
+    assert closest == "weld speed"
