@@ -227,6 +227,8 @@ class FileWriter:
         summary = body + offsets + foot
         crc = struct.pack("<I", crc32(summary))
         self._write([data_end, summary, crc, records.MAGIC])
+        # A recording may keep many finished files in mind.
+        self._chunks.clear()
 
     def _summary(self) -> Sequence[tuple[int, Sequence[bytes]]]:
         counts = records.statistics(

@@ -47,7 +47,11 @@ def kill(loop: subprocess.Popen[str]) -> None:
 
 @pytest.mark.parametrize("seed", range(KILLS))
 def test_a_killed_loop_loses_nothing_that_was_accepted(tmp_path: Path, seed: int) -> None:
-    session, counters = tmp_path / "weld.mcap", tmp_path / "counters"
+    kill_and_check(tmp_path, seed)
+
+
+def kill_and_check(where: Path, seed: int) -> None:
+    session, counters = where / "weld.mcap", where / "counters"
     loop = start_loop(session, counters)
     time.sleep(random.Random(seed).uniform(0.0, 0.9))
     kill(loop)
