@@ -33,3 +33,25 @@ function makeSeen(figure, frames) {
     figure.dataset.cursor = String(seconds);
   });
 }
+
+/* The camera in the corner of the window while its own place is out of sight; a button closes it. */
+function makeFollower(frames, places) {
+  const figure = document.getElementById("follow"), button = document.getElementById("camera");
+  const image = figure.querySelector("img");
+  const seen = new Set();
+  const settle = () => { figure.hidden = seen.size > 0 || button.getAttribute("aria-pressed") !== "true"; };
+  frames.follow((shown) => {
+    if (image.src !== shown.src) image.src = shown.src;
+    image.alt = shown.alt;
+  });
+  const observer = new IntersectionObserver((entries) => {
+    for (const entry of entries) seen[entry.isIntersecting ? "add" : "delete"](entry.target);
+    settle();
+  });
+  places.forEach((place) => observer.observe(place));
+  button.addEventListener("click", () => {
+    button.setAttribute("aria-pressed", String(button.getAttribute("aria-pressed") !== "true"));
+    settle();
+  });
+  button.hidden = false;
+}

@@ -89,6 +89,8 @@ async function enliven() {
     makeSeen(document.getElementById(block.id).querySelector(".seen"), cameras.get(block.frames_id));
   }
   bus.photos.push(...cameras.values());
+  const [camera] = cameras.values();
+  if (camera) makeFollower(camera, document.querySelectorAll(".moment .seen, figure.frames"));
   const photo = bus.photos.find((one) => one.isBead), plot = bus.plots[0];
   const tie = photo && bus.links.find((one) => one.source === photo.domain);
   const link = photo ? bus.links.find((one) => tie && one.source === tie.target) : bus.links[0];

@@ -113,6 +113,22 @@ def test_the_camera_picture_of_the_moment_is_shown(visitor: Visitor, sample_page
     assert page.evaluate(same, images)
 
 
+def test_the_camera_goes_along_when_its_place_is_out_of_sight(
+    visitor: Visitor, sample_page: Path
+) -> None:
+    page = visitor.open(sample_page).page
+    assert page.locator("#follow").is_hidden()
+    _hover(page, ERROR, 0.5)
+    page.locator("#follow").wait_for(state="visible")
+    same = "([a, b]) => document.querySelector(a).src === document.querySelector(b).src"
+    assert page.evaluate(same, ["#frames-0-seam img:not([hidden])", "#follow img"])
+    page.locator("#camera").click()
+    page.locator("#follow").wait_for(state="hidden")
+    page.locator("#camera").click()
+    page.evaluate("scrollTo(0, 0)")
+    page.locator("#follow").wait_for(state="hidden")
+
+
 def test_hovering_the_photo_and_a_time_plot_moves_the_width(
     visitor: Visitor, sample_page: Path, sample: Results
 ) -> None:
