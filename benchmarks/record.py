@@ -209,6 +209,7 @@ def tails(folder: Path, seconds: float) -> Iterator[Figure]:
             loop = make(stack, folder)
             time.sleep(0.5)
             rows[name] = paced(loop, images, seconds)
+    yield from sizes(folder)
     numbers = {name: float(np.percentile(row.numbers_s, 99.9)) for name, row in rows.items()}
     frames = {name: float(np.percentile(row.pictures_s, 99)) for name, row in rows.items()}
     for name in rows:
@@ -220,6 +221,17 @@ def tails(folder: Path, seconds: float) -> Iterator[Figure]:
         yield Figure("paced: encoder p99.9, foxglove-zstd / ours", ratio, "x", ">= 10")
     ratio = frames["mcap"] / frames["seamlog"]
     yield Figure("paced: picture p99, mcap / ours", ratio, "x", ">= 30")
+
+
+def sizes(folder: Path) -> Iterator[Figure]:
+    """Files of the paced loops: the same messages and pictures."""
+    own = (folder / "own.mcap").stat().st_size
+    yield Figure("paced: file", own / 1e6, "MB")
+    for name in ("mcap", "foxglove-True"):
+        peer = folder / f"{name}.mcap"
+        if peer.exists():
+            label = name.replace("-True", "-zstd")
+            yield Figure(f"paced: file, ours / {label}", own / peer.stat().st_size, "x")
 
 
 def pictures_640(count: int) -> list[np.ndarray[Any, Any]]:

@@ -1,12 +1,12 @@
 """Snapshot mode: the last seconds wait in memory until something is worth writing.
 
-Chunks are kept as the feeds made them; their messages count as written when they are in the file,
-as discarded when they grow too old. Times are log times.
+Chunks are kept as the feeds made them, log times in order; their messages count as written when
+they are in the file, as discarded when they grow too old. Times are log times.
 """
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,22 @@ class _Chunk:
     log_times_ns: NDArray[np.uint64]
     offsets: NDArray[np.uint64]
     compression: str
-    start_ns: int
-    end_ns: int
+
+    @property
+    def start_ns(self) -> int:
+        return int(self.log_times_ns[0])
+
+    @property
+    def end_ns(self) -> int:
+        return int(self.log_times_ns[-1])
+
+    def part(self, first: int, last: int) -> "_Chunk":
+        """Messages `first` up to and without `last`."""
+        begin = int(self.offsets[first]) if first < len(self.offsets) else len(self.data)
+        end = int(self.offsets[last]) if last < len(self.offsets) else len(self.data)
+        offsets = self.offsets[first:last] - np.uint64(begin)
+        times = self.log_times_ns[first:last]
+        return replace(self, data=self.data[begin:end], log_times_ns=times, offsets=offsets)
 
 
 class SnapshotBuffer:
@@ -57,7 +71,7 @@ class SnapshotBuffer:
         self._held: deque[_Chunk] = deque()
         self._bytes = 0
         self._newest_ns = 0
-        self._until_ns = -1
+        self._from_ns, self._until_ns = 0, -1
         self.is_short = False
         """Memory was too small to keep all of the time before a trigger."""
 
@@ -80,6 +94,8 @@ class SnapshotBuffer:
     def trigger(self, reason: str, time_ns: int) -> None:
         """Begin a snapshot around `time_ns`, or make the running one longer."""
         is_new = not self.is_open
+        if is_new:
+            self._from_ns = max(time_ns - self._before_ns, 0)
         self._until_ns = max(self._until_ns, time_ns + self._after_ns)
         if is_new:
             self._tell(reason, time_ns)
@@ -92,16 +108,14 @@ class SnapshotBuffer:
         for watch in self._watches:
             if topic in watch.rule.topics:
                 rows = np.frombuffer(chunk.data, np.uint8).reshape(len(chunk.offsets), -1)
-                if (time_ns := watch.first(topic, rows)) is not None:
+                for time_ns in watch.span(topic, rows) or ():
                     self.trigger(watch.rule.text, time_ns)
 
     def step(self) -> None:
         """Write what belongs to a snapshot, forget what is too old; after an `OSError` again."""
         if self.is_open:
             for chunk in [row for row in self._held if row.start_ns <= self._until_ns]:
-                self._write(chunk)
-                self._held.remove(chunk)
-                self._bytes -= len(chunk.data)
+                self._let_through(chunk)
             if self._newest_ns > self._until_ns + _STRAGGLE_NS:
                 self._until_ns = -1
         while self._held and self._is_old(self._held[0]):
@@ -120,6 +134,21 @@ class SnapshotBuffer:
             self.is_short = True
             return True
         return chunk.end_ns < self._newest_ns - self._before_ns
+
+    def _let_through(self, chunk: _Chunk) -> None:
+        """Write what of a chunk belongs to the snapshot; the older goes, the newer stays."""
+        first, last = np.searchsorted(
+            chunk.log_times_ns, np.array([self._from_ns, self._until_ns + 1], np.uint64)
+        ).tolist()
+        if first < last:
+            self._write(chunk.part(first, last))
+        chunk.ring.words[DISCARDED] += first
+        place = self._held.index(chunk)
+        rest = chunk.part(last, len(chunk.offsets))
+        self._held[place] = rest
+        if not len(rest.offsets):
+            del self._held[place]
+        self._bytes -= len(chunk.data) - len(rest.data)
 
     def _write(self, chunk: _Chunk) -> None:
         self._file.write_chunk(
@@ -145,9 +174,6 @@ class HeldSink:
         compression: str,
     ) -> bool:
         """Hold the chunk; False: it is not in the file yet."""
-        start, end = int(log_times_ns.min()), int(log_times_ns.max())
-        chunk = _Chunk(
-            self._ring, channel_id, bytes(data), log_times_ns, offsets, compression, start, end
-        )
+        chunk = _Chunk(self._ring, channel_id, bytes(data), log_times_ns, offsets, compression)
         self._buffer.hold(self._topic, chunk)
         return False

@@ -93,15 +93,15 @@ class RuleWatch:
         empty = (np.zeros(0, np.int64), np.zeros(0))
         self._reference = self._encoder = empty
 
-    def first(self, topic: str, records: NDArray[np.uint8]) -> int | None:
-        """Log time of the first message of `records`, shape (n, stride), for which it holds."""
+    def span(self, topic: str, records: NDArray[np.uint8]) -> tuple[int, int] | None:
+        """Log times of the first and last message of `records` (n, stride) for which it holds."""
         times = records[:, _LOG_TIME].copy().view("<i8").ravel()
         name = _POSITION if self.rule.is_error else self.rule.field
         values = _column(topic, name, records)
         if self.rule.is_error:
             times, values = self._errors(topic, times, values)
         where = np.flatnonzero(self.rule.holds(values))
-        return int(times[where[0]]) if len(where) else None
+        return (int(times[where[0]]), int(times[where[-1]])) if len(where) else None
 
     def _errors(
         self, topic: str, times: NDArray[np.int64], values: NDArray[np.float64]

@@ -255,3 +255,39 @@ def test_a_clean_recording_is_compacted_on_demand(lab: Lab) -> None:
     code, _, errors = lab.record("table", "--compact")
     assert code == 2
     assert "there already" in errors
+
+
+def test_how_a_recording_is_kept_is_chosen_by_options(lab: Lab) -> None:
+    code, output, _ = lab.record("table", "--sync", "eco", "--budget", "20 GiB", "--json")
+    assert code == 0
+    document = json.loads(output)
+    assert document["segments"] == [str(lab.path)]
+    assert "within 5.1 s" in document["acknowledgement"]["durable"]
+
+
+def test_a_snapshot_by_a_rule(lab: Lab) -> None:
+    rule = "/table/encoder.position_m >= 400 m"
+    code, output, _ = lab.record("table", "--snapshot", "1+0.5", "--trigger", rule)
+    assert code == 0, output
+    assert "messages were discarded" in output
+    values = [m.values[0] for m in read_session(lab.path)["/table/encoder"]]
+    assert values == [float(n) for n in range(300, 500)]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--segment-size", "much"), "500MB or 20GiB"),
+        (("--segment-size", "10 KB"), "at least 1 MiB"),
+        (("--budget", "1MiB"), "at least 4 MiB"),
+        (("--snapshot", "ten"), "10+5"),
+        (("--trigger", "error > 1 mm"), "--snapshot"),
+        (("--snapshot", "10+5", "--trigger", "error > 1"), "say the unit"),
+        (("--snapshot", "-1"), "some time before"),
+    ],
+)
+def test_options_that_make_no_sense(lab: Lab, options: tuple[str, ...], words: str) -> None:
+    code, _, errors = lab.record("table", *options)
+    assert code == 2
+    assert words in errors
+    assert not list(lab.folder.glob("*.mcap*"))
