@@ -21,6 +21,8 @@ _DISTINCT = 6.0
 """The pattern's peak in the spectrum against the median around it."""
 _PARTS = 4
 _HALF_BAND_PX = 2
+_READING_PX = 0.25
+"""How well the phase of a real ruler's ticks can be read."""
 
 
 def read_ruler(
@@ -42,7 +44,7 @@ def read_ruler(
         count = float(ticks(last) - ticks(first))
         ends = (start_px + first * direction, start_px + last * direction)
         (ax, ay), (bx, by) = ends
-        reading = max(scatter * (last - first) / count, 0.02)
+        reading = max(scatter * (last - first) / count, _READING_PX)
         found.append(
             KnownLength(count * tick_mm, (float(ax), float(ay)), (float(bx), float(by)), reading)
         )

@@ -23,7 +23,9 @@ TILTED_U = 0.005
 READING_PX = 0.5
 _SHORTEST_PX = 30.0
 _APART = 0.05
-"""Two lengths show a tilt if their middles are this part of the picture apart."""
+"""Lengths show a tilt if they lie this part of the picture beside each other."""
+_USUAL_TILT = 0.2
+"""Change of scale over the picture that is usual: keeps misread lengths from making a tilt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def calibrate_scale(
         raise UsageError("no known length; give --length or --ruler")
     for length in lengths:
         _check(length, size_px, name)
-    if _apart(lengths, size_px):
+    if _on_both_sides(lengths, size_px):
         return _tilted(lengths, size_px, name, date)
     scales = np.array([length.mm / length.px for length in lengths])
     weights = np.array([length.px for length in lengths])
@@ -110,9 +112,13 @@ def _check(length: KnownLength, size_px: tuple[int, int], name: str) -> None:
         )
 
 
-def _apart(lengths: Sequence[KnownLength], size_px: tuple[int, int]) -> bool:
-    middles = np.array([length.ends().mean(axis=0) for length in lengths])
-    return bool(np.hypot(*np.ptp(middles, axis=0)) > _APART * max(size_px))
+def _on_both_sides(lengths: Sequence[KnownLength], size_px: tuple[int, int]) -> bool:
+    """Whether the lengths lie beside each other rather than on one line, as on one ruler."""
+    ends = [length.ends() for length in lengths]
+    middles = np.array([pair.mean(axis=0) for pair in ends])
+    along = (ends[0][1] - ends[0][0]) / lengths[0].px
+    aside = middles @ np.array([-along[1], along[0]])
+    return bool(np.ptp(aside) > _APART * max(size_px))
 
 
 def _tilted(
@@ -131,7 +137,7 @@ def _tilted(
     def misses(values: NDArray[np.float64]) -> NDArray[np.float64]:
         off = [np.log(_length_mm(matrix(values), item) / item.mm) for item in lengths]
         weighed = np.array(off) / np.array([item.relative_u for item in lengths])
-        return np.concatenate([weighed, 1e-3 * values[1:]])
+        return np.concatenate([weighed, values[1:] / _USUAL_TILT])
 
     start = np.log(np.median([item.mm / item.px for item in lengths]))
     solved = least_squares(misses, np.array([start, 0.0, 0.0]))

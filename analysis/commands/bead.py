@@ -176,7 +176,10 @@ def _outcome(
         lines.append(f"Results: {output}")
     failed = any(document["verdict"] == "FAIL" for document in documents)
     refused = any(item.refusal is not None for item in assessed)
-    ending = Ending.FINDING if failed else Ending.BATCH_FAILED if refused else Ending.PASS
+    undecided = any(each["limits"] and each["verdict"] != "PASS" for each in documents)
+    ending = Ending.BATCH_FAILED if refused else Ending.PASS
+    if failed or undecided:
+        ending = Ending.FINDING if failed else Ending.NO_EVIDENCE
     document = {
         "photos": documents,
         "not_stitched": apart,

@@ -89,3 +89,43 @@ def test_nothing_to_measure_is_a_usage_error(capsys: pytest.CaptureFixture[str])
     code, _, err = run(["bead", "measure"], capsys)
     assert code == ExitCode.USAGE
     assert "name a photo" in err
+
+
+def test_quality_and_surface_through_the_command(
+    photo: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = photo.parent / "limits.toml"
+    config.write_text(
+        '[quality]\nlevel = "C"\nplate_thickness_mm = 8\n[quality.limits]\n'
+        "width_mm = { lower = 4, upper = 8 }\ngaps = { upper = 0 }\n"
+    )
+    output = photo.parent / "r"
+    arguments = ["bead", "measure", str(photo), "--config", str(config), "-o", str(output)]
+    code, out, _ = run([*arguments, "--json"], capsys)
+    (document,) = json.loads(out)["photos"]
+    verdicts = {limit["name"]: limit["verdict"] for limit in document["limits"]}
+    assert (verdicts["width_mm"], verdicts["gaps"]) == ("PASS", "PASS")
+    assert code == ExitCode.EVIDENCE, "rows that were asked for could not be judged"
+    assert verdicts["iso_100"] == "NOT MEASURABLE"
+    assert document["surface"]["spatter_count"] <= 2
+    assert {part.part for part in Results.open(output).parts()} == {"bead", "surface", "quality"}
+    assert (output / "bead.stations.csv").read_text().startswith("s_mm,width_mm,u_width_mm")
+    config.write_text("[quality.limits]\nwidht_mm = { upper = 8 }\n")
+    code, _, err = run([*arguments, "--force"], capsys)
+    assert (code, "widht_mm" in err) == (ExitCode.USAGE, True)
+    missing = [*arguments, "--force", "--before", str(photo.parent / "nowhere.png")]
+    assert run(missing, capsys)[0] in (ExitCode.USAGE, ExitCode.INPUT)
+
+
+def test_photos_of_different_beads_are_not_stitched(
+    photo: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bead = render(Scene(width_px=512, height_px=300, noise=3), 9)
+    other = photo.with_name("other.png")
+    assert cv2.imwrite(str(other), bead.pixels)
+    text = bead.calibration.model_dump_json(by_alias=True)
+    other.with_suffix(".calibration.json").write_text(text)
+    code, out, _ = run(["bead", "measure", str(photo), str(other), "--json"], capsys)
+    document = json.loads(out)
+    assert (code, len(document["photos"])) == (ExitCode.PASS, 2)
+    assert "photos 1 and 2" in document["not_stitched"]
