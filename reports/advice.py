@@ -72,12 +72,12 @@ def _replayed(part: Part) -> list[str]:
         return []
     ranked = sorted(others, key=lambda name: float(others[name].value or 0.0))
     told = _listed({name: others[name] for name in ranked[:_MOST]})
-    against = f"rms tracking error {figure_quantity(base)} with the recorded one"
+    against = f"the recorded one {figure_quantity(base)}"
     if _is_better(others[ranked[0]], base):
-        return [f"Another controller ({ranked[0]}), as the replay predicts: {told}; {against}."]
+        return [f"Another controller, {ranked[0]}: rms tracking error {told}; {against} (replay)."]
     number = "the one" if len(others) == 1 else f"none of the {len(others)}"
-    words = f"Another controller would not have tracked better, {number} replayed"
-    return [f"{words}: {told}; {against}."]
+    verb = "replayed tracks no better" if len(others) == 1 else "replayed tracks better"
+    return [f"Not another controller: {number} {verb} (rms error {told}; {against})."]
 
 
 def _listed(figures: Mapping[str, Figure]) -> str:

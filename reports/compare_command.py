@@ -45,9 +45,10 @@ def compare(
     from seamlog.results import Results, Verdict
 
     from .compare_report import compare_report, markdown, summary
-    from .comparison import compare_runs, read_tolerances
+    from .comparison import compare_runs
     from .replayed import replays_of
     from .run import Run
+    from .tolerances import read_tolerances
 
     if output is not None:
         check_output(output, force)

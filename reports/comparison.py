@@ -8,15 +8,15 @@ no longer be told. A curve of errors regresses if its mean magnitude grew beyond
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from seamlog.errors import UsageError
 from seamlog.results import Criterion, Figure, Part, Verdict
 
 from .block import Block
 from .numbers import COVERAGE
 from .pairing import Paired, Shared, pair, shared_columns
 from .run import Run
+from .tolerances import Tolerances
 
 WORSE_LARGER = (
     "_error_mm",
@@ -36,56 +36,6 @@ WORSE_LARGER = (
 """Endings of figures for which larger is worse; all others are shown and not judged."""
 _MAGNITUDE = "mean_error_mm"
 """A mean of signed errors: its distance from zero counts."""
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """How much worse is still as good: a share of the base's value, or so many of its unit."""
-
-    value: float
-    relative: bool
-
-    def allowed(self, base: float) -> float:
-        """The growth that is allowed."""
-        return self.value * abs(base) if self.relative else self.value
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """One for all figures, and those of single figures by name."""
-
-    default: Tolerance = Tolerance(0.05, True)
-    named: dict[str, Tolerance] = field(default_factory=dict)
-
-    def of(self, name: str) -> Tolerance:
-        """The tolerance of a figure."""
-        return self.named.get(name, self.default)
-
-
-def read_tolerances(texts: Sequence[str]) -> Tolerances:
-    """From texts such as `10%` (all figures), `rms_error_mm=0.05`, `width_cv=20%`."""
-    default, named = Tolerances().default, {}
-    for text in texts:
-        name, equals, value = text.rpartition("=")
-        tolerance = _tolerance(value, text)
-        if equals:
-            named[name.strip()] = tolerance
-        elif tolerance.relative:
-            default = tolerance
-        else:
-            raise UsageError(f"--tolerance {text}: say which figure's, as rms_error_mm={text}")
-    return Tolerances(default, named)
-
-
-def _tolerance(value: str, text: str) -> Tolerance:
-    relative = value.strip().endswith("%")
-    try:
-        number = float(value.strip().removesuffix("%"))
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number) or number < 0:
-        raise UsageError(f"--tolerance {text}: write it as 5% or NAME=0.05 or NAME=5%")
-    return Tolerance(number / 100 if relative else number, relative)
 
 
 class Change(Block):

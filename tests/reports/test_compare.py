@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from seamlog.cli import run
 from seamlog.errors import UsageError
-from seamlog.reports.comparison import Comparison, compare_runs, read_tolerances
+from seamlog.reports.comparison import Comparison, compare_runs
 from seamlog.reports.pairing import effective_count, mean_interval
 from seamlog.reports.run import Run
+from seamlog.reports.tolerances import read_tolerances
 from seamlog.results import Criterion, Figure, Part, Results, Verdict
 from tests.browsing import Visitor
 from tests.reports.sample_results import START_NS, write_sample
