@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from seamlog.errors import UnknownName
+from seamlog.plugins import unknown_name
 from seamlog.results import Criterion, Figure, Part, Verdict
 
 from .block import Block
@@ -32,6 +34,9 @@ WORSE_LARGER = (
     "peak_to_peak_25mm",
     "excursions",
     "spatter_count",
+    "spatter_per_100mm",
+    "spatter_area_mm2",
+    "gap_length_mm",
 )
 """Endings of figures for which larger is worse; all others are shown and not judged."""
 _MAGNITUDE = "mean_error_mm"
@@ -88,12 +93,13 @@ class Comparison:
 
 def compare_runs(runs: Sequence[Run], tolerances: Tolerances) -> Comparison:
     """Every other run against the first; labels that are alike get the number of their run."""
+    shared = list(shared_columns(runs))
+    _check_names(runs[0], shared, tolerances)
     labels = distinct_labels(runs)
     changes = [
         change for part in runs[0].parts for change in _changes(runs, labels, part, tolerances)
     ]
     limits = [limit for part in runs[0].parts for limit in _limits(runs, labels, part)]
-    shared = list(shared_columns(runs))
     named = dict(zip((id(run) for run in runs), labels, strict=True))
     paired = [
         item.model_copy(update={"run": label})
@@ -115,6 +121,15 @@ def compare_runs(runs: Sequence[Run], tolerances: Tolerances) -> Comparison:
             if _value(figure) is None
         ],
     )
+
+
+def _check_names(base: Run, shared: Sequence[Shared], tolerances: Tolerances) -> None:
+    """A tolerance of a figure that is not there would be ignored: it is refused."""
+    known = {figure.name for part in base.parts for figure in part.figures}
+    known |= {each.column for each in shared if each.is_error}
+    for name in tolerances.named:
+        if name not in known:
+            raise UnknownName(unknown_name("figures", name, sorted(known)))
 
 
 def distinct_labels(runs: Sequence[Run]) -> list[str]:

@@ -6,12 +6,13 @@ import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import click
 
-from seamlog.called import filled
+from seamlog.called import OUTPUT, RESULTS, filled
 from seamlog.command import command
 from seamlog.errors import EvidenceError, InputError, SeamlogError
 from seamlog.outcome import Ending, Outcome
@@ -22,6 +23,8 @@ RELATIVE = 1e-6
 _ABSOLUTE = 1e-9
 _TWIN = re.compile(r'<script type="application/json" id="seamlog-report">(.*?)</script>', re.DOTALL)
 _MOST_TOLD = 20
+_ANALYSES = ("analyze", "bead", "identify", "replay", "sweep")
+_WRITING = ("-o", "--output", "--results")
 
 
 @dataclass
@@ -115,8 +118,24 @@ def _recompute(results: Results, given: dict[str, Path], found: _Findings) -> No
             found.untold.append(f"{_stems(parts)}: not recomputed, input not given: {names}")
         elif not words:
             found.untold.append(f"{_stems(parts)}: not recomputed, not made by a command")
+        elif not _is_harmless(words, {entry.name for part in parts for entry in part.inputs}):
+            told = " ".join(words)
+            found.untold.append(f"{_stems(parts)}: not recomputed, 'seamlog {told}' may do harm")
         else:
             _run_again(words, parts, given, found)
+
+
+def _is_harmless(words: Sequence[str], inputs: set[str]) -> bool:
+    """Results come from anywhere: only analyses run, write where we say, and read what was given.
+
+    A word that is a file here and no input (a controller of one's own, a path) would be run unseen.
+    """
+    writes = [after for word, after in pairwise(words) if word in _WRITING]
+    placed = all(word.startswith((RESULTS, OUTPUT)) for word in writes)
+    values = {word.rpartition("=")[2].partition(":")[0] for word in words} | set(words)
+    strange = any(value and Path(value).exists() for value in values - inputs)
+    joined = any(word.startswith(_WRITING) and word not in _WRITING for word in words)
+    return words[0] in _ANALYSES and placed and not joined and not strange
 
 
 def _run_again(

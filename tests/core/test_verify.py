@@ -92,6 +92,36 @@ def test_results_changed_after_the_analysis_are_found(
     assert "changed since" in told
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["record", "--source", "virtual-cell", "-o", "{output}.mcap"],
+        ["analyze", "weld.mcap", "-o", "precious"],
+        ["analyze", "weld.mcap", "--output=precious"],
+        ["analyze", "weld.mcap", "-oprecious"],
+        ["replay", "weld.mcap", "--controller", "own.py:Own", "-o", "{output}.mcap"],
+        ["replay", "weld.mcap", "--controller=own.py:Own", "-o", "{output}.mcap"],
+    ],
+)
+def test_a_command_that_may_do_harm_is_not_run(
+    made: Path,
+    tmp_path: Path,
+    words: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Results may come from a stranger: what they say made them is no order."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.py").write_text("raise SystemExit('ran')")
+    shutil.copytree(made / "r", tmp_path / "r")
+    for path in (tmp_path / "r").glob("*.json"):
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"command": words}))
+    run(["report", "r", "-o", "again.html"])
+    assert run(["verify", "again.html", "r", str(made / "weld.mcap")]) == 6
+    assert "may do harm" in capsys.readouterr().out
+    assert not (tmp_path / "precious").exists()
+
+
 @pytest.mark.parametrize("text", ["", "<html></html>", "{}", "[]", "\x00\xff"])
 def test_what_is_no_report_is_said(made: Path, tmp_path: Path, text: str) -> None:
     (tmp_path / "x.html").write_text(text)

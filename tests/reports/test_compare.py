@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from seamlog.cli import run
-from seamlog.errors import UsageError
+from seamlog.errors import UnknownName, UsageError
 from seamlog.reports.comparison import Comparison, compare_runs
 from seamlog.reports.pairing import effective_count, mean_interval
 from seamlog.reports.run import Run
@@ -91,6 +91,11 @@ def test_nothing_in_common_is_no_verdict(tmp_path: Path) -> None:
 def test_a_tolerance_that_makes_no_sense_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="--tolerance"):
         read_tolerances([text])
+
+
+def test_a_tolerance_of_a_figure_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'rms_error_mm'"):
+        _compared(tmp_path, {"figures": _rms(1.0)}, {"figures": _rms(1.0)}, "rms_eror_mm=1")
 
 
 def _alike(random: np.random.Generator, count: int, share: float) -> NDArray[np.float64]:
