@@ -18,6 +18,9 @@ READERS = [
     ["attach", "{file}", "photo.png"],
     ["identify", "{file}", "-o", "out"],
     ["replay", "{file}", "--controller", "pd", "-o", "out.mcap"],
+    ["import", "{file}", "-o", "out.mcap"],
+    ["export", "{file}", "-o", "out.mat"],
+    ["compact", "{file}", "-o", "out.mcap"],
     ["bead", "measure", "--session", "{file}", "-o", "out"],
     ["analyze", "{file}", "-o", "out"],
     ["report", "{file}", "-o", "out.html"],
@@ -78,7 +81,7 @@ def test_foreign_logs_that_are_none_end_with_code_3(
 def test_a_log_that_no_importer_knows_lists_the_importers(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    words = ["import", FOREIGN, "--map", "map.toml", "-o", "out.mcap"]
+    words = ["import", "photo.png", "--map", "map.toml", "-o", "out.mcap"]
     code, message = complaint(words, capsys)
     assert code == 2 and "mat" in message and "csv" in message
 

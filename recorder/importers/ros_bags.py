@@ -31,15 +31,17 @@ class Ros2Importer:
         files, notes = _files(path)
         message_mode = _is_compressed_by_message(path)
         streams = _Streams(writer, notes)
+        read = 0
         for file in files:
             with _plain(file) as plain:
                 if plain.suffix == ".mcap":
-                    _copy_mcap(plain, writer, notes)
+                    read += _copy_mcap(plain, writer, notes)
                 else:
                     streams.copy_sqlite(plain, file, message_mode)
+                    read += 1
         streams.finish()
-        if not files:
-            raise ImportFailed(f"{path}: no file of this bag is there; {'; '.join(notes)}")
+        if not read:
+            raise ImportFailed(f"{path}: nothing of this bag can be read; {'; '.join(notes)}")
         return notes
 
 
@@ -217,14 +219,15 @@ def _plain(file: Path) -> Iterator[Path]:
         yield plain
 
 
-def _copy_mcap(path: Path, writer: BatchWriter, notes: list[str]) -> None:
+def _copy_mcap(path: Path, writer: BatchWriter, notes: list[str]) -> bool:
     try:
         file = McapFile(path)
     except SessionError as error:
         notes.append(str(error))
-        return
+        return False
     try:
         writer.copy_file(file)
         notes.extend(file.problems)
     finally:
         file.close()
+    return True

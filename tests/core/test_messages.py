@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -50,6 +50,7 @@ def values_of(channel: Channel) -> st.SearchStrategy[tuple[Any, ...]]:
 
 
 @pytest.mark.parametrize("channel", OWN, ids=lambda channel: channel.topic)
+@settings(deadline=None)
 @given(data=st.data())
 def test_encoded_messages_are_read_by_rosbags(channel: Channel, data: st.DataObject) -> None:
     values = data.draw(values_of(channel))
@@ -59,6 +60,7 @@ def test_encoded_messages_are_read_by_rosbags(channel: Channel, data: st.DataObj
 
 
 @pytest.mark.parametrize("channel", FIXED, ids=lambda channel: channel.topic)
+@settings(deadline=None)
 @given(data=st.data())
 def test_the_fixed_layout_packs_the_same_bytes(channel: Channel, data: st.DataObject) -> None:
     values = data.draw(values_of(channel))
