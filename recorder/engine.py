@@ -165,9 +165,10 @@ class Engine:
 
     def _mark(self) -> int:
         """Note what is written at the moment when a sync is asked for."""
-        written = [(feed.ring, int(feed.ring.words[WRITTEN])) for feed in self._feeds]
         self._marked += 1
-        self._marks.append(_Mark(self._marked, self._log_time_ns(), written))
+        if self._file.is_durable:
+            written = [(feed.ring, int(feed.ring.words[WRITTEN])) for feed in self._feeds]
+            self._marks.append(_Mark(self._marked, self._log_time_ns(), written))
         return self._marked
 
     def _note_sync(self) -> None:

@@ -11,6 +11,7 @@ Items are numbered and appear by rename, so they are whole, in order, and outliv
 """
 
 import fcntl
+import glob
 import json
 import os
 import shutil
@@ -27,6 +28,7 @@ from typing import Any
 from seamlog.contracts import Pace
 from seamlog.errors import HardwareError, SpaceMissing, UsageError
 
+from .ring import holds_messages
 from .segment import part_of
 from .storage import Snapshot, Storage
 
@@ -98,15 +100,15 @@ def read_recording(folder: Path) -> Recording:
 def abandoned_folders() -> list[Path]:
     """Folders of recordings whose processes are all dead.
 
-    Those whose unfinished session file is gone as well hold nothing anyone could still use and
-    are removed, those of other versions are left alone; the others are returned.
+    Kept and returned are those of which a session file is unfinished, or some file is there and
+    messages wait in the rings; those of other versions are left alone, the others removed.
     """
     kept = []
     for folder in root().iterdir():
         if not _is_abandoned(folder):
             continue
         try:
-            wanted = read_recording(folder).partial.exists()
+            wanted = _is_wanted(folder, Path(read_recording(folder).path))
         except FileNotFoundError:
             wanted = False
         except (OSError, ValueError, TypeError, KeyError, UsageError):
@@ -116,6 +118,14 @@ def abandoned_folders() -> list[Path]:
         else:
             shutil.rmtree(folder, ignore_errors=True)
     return kept
+
+
+def _is_wanted(folder: Path, session: Path) -> bool:
+    files = list(session.parent.glob(f"{glob.escape(session.stem)}*.mcap*"))
+    if any(path.suffix == ".part" for path in files):
+        return True
+    waiting = any(holds_messages(ring) for ring in folder.glob("*.ring"))
+    return bool(files) and (waiting or any(folder.glob("*.data")))
 
 
 def is_locked(folder: Path) -> bool:

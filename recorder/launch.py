@@ -95,6 +95,9 @@ class WritingProcess:
             os.close(number)
         self._listener = threading.Thread(target=self._listen, name="recorder", daemon=True)
         self._listener.start()
+
+    def await_ready(self) -> None:
+        """Until the process works, or is lost, or takes too long."""
         self._ready.wait(_START_S)
 
     def _listen(self) -> None:

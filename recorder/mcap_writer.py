@@ -109,6 +109,11 @@ class SessionFile:
         """Mark of the last sync that is on the disk."""
         return self._syncer.done_mark
 
+    @property
+    def is_durable(self) -> bool:
+        """No sync has failed so far."""
+        return self._syncer.is_durable
+
     def free_bytes(self) -> int:
         """Free space of the file system that holds the session."""
         try:

@@ -64,6 +64,12 @@ class Recorder(Producer):
             os.close(descriptor)
             raise
         _living.add(self)
+        try:
+            self._process.await_ready()
+        except BaseException:
+            self.close()
+            self.path.unlink(missing_ok=True)
+            raise
 
     @property
     def id(self) -> str:

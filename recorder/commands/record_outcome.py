@@ -63,7 +63,11 @@ def _verdict(run: "Run") -> str:
         return f"Complete: all around the triggers; {discarded} other messages were discarded."
     if run.status.is_complete:
         return "Complete: every message that the source offered is in the session."
-    dropped, refused, lost = (
-        sum(getattr(row, name) for row in rows) for name in ("dropped", "refused", "lost")
-    )
-    return f"INCOMPLETE: {dropped} dropped, {refused} refused, {lost} lost."
+    counts = {
+        name: sum(getattr(row, name) for row in rows)
+        for name in ("dropped", "refused", "lost", "waiting")
+    }
+    told = "{dropped} dropped, {refused} refused, {lost} lost".format_map(counts)
+    if counts["waiting"]:
+        told += f", {counts['waiting']} accepted and still in memory: 'seamlog recover' saves them"
+    return f"INCOMPLETE: {told}."

@@ -1,12 +1,15 @@
 """A disk that fills up: what is there is a whole session, and space brings the recording back."""
 
+import gc
+import os
 import time
 from pathlib import Path
 
 import pytest
 
+from seamlog.cli import run
 from seamlog.recorder import Recorder, Status
-from seamlog.recorder.folder import root
+from seamlog.recorder.folder import abandoned_folders, root
 from tests.faults.accounts import check_identities, ring_stamps, session_stamps
 
 MIB = 1 << 20
@@ -39,7 +42,7 @@ def put_until_full(recorder: Recorder, accepted: list[int], seconds: float = 60.
 
 
 def test_what_is_on_a_full_disk_is_a_whole_session(small_disk: Path) -> None:
-    fill(small_disk, 3 * MIB)
+    ballast = fill(small_disk, 3 * MIB)
     accepted: list[int] = []
     recorder = Recorder(small_disk / "weld.mcap")
     put_until_full(recorder, accepted)
@@ -53,6 +56,16 @@ def test_what_is_on_a_full_disk_is_a_whole_session(small_disk: Path) -> None:
     assert not list(small_disk.glob("*.part"))
     assert row.lost == 0
     assert any(str(root()) in finding for finding in status.findings)
+    # The next recording does not take the rings for left-overs, and recover joins both.
+    folder = root() / status.recording_id
+    os.utime(folder, (0, 0))
+    assert folder in abandoned_folders()
+    ballast.unlink()
+    del recorder
+    gc.collect()
+    recovered = small_disk / "whole.mcap"
+    run(["recover", str(small_disk / "weld.mcap"), "-o", str(recovered)])
+    assert session_stamps(recovered)["/table/encoder"] == accepted
 
 
 def test_space_that_comes_back_brings_the_recording_back(small_disk: Path) -> None:
