@@ -80,16 +80,17 @@ def _grey8(pixels: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _chessboard(grey: NDArray[np.uint8], board: Board) -> tuple[Points, Points] | None:
-    inner = (board.columns - 1, board.rows - 1)
+    """Inner corners; many people count these where squares are asked for, so both are tried."""
     flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
-    done, corners = cv2.findChessboardCornersSB(grey, inner, flags=flags)
-    if not done:
-        done, corners = cv2.findChessboardCorners(grey, inner)
-    if not done:
-        return None
-    column, row = np.meshgrid(np.arange(inner[0]), np.arange(inner[1]))
-    mm = board.square_mm * np.column_stack([column.ravel(), row.ravel()]).astype(np.float64)
-    return np.asarray(corners, dtype=np.float64).reshape(-1, 2), mm
+    for inner in ((board.columns - 1, board.rows - 1), (board.columns, board.rows)):
+        done, corners = cv2.findChessboardCornersSB(grey, inner, flags=flags)
+        if not done:
+            done, corners = cv2.findChessboardCorners(grey, inner)
+        if done:
+            column, row = np.meshgrid(np.arange(inner[0]), np.arange(inner[1]))
+            mm = board.square_mm * np.column_stack([column.ravel(), row.ravel()])
+            return np.asarray(corners, dtype=np.float64).reshape(-1, 2), mm.astype(np.float64)
+    return None
 
 
 def _charuco(grey: NDArray[np.uint8], board: Board) -> tuple[Points, Points] | None:

@@ -45,6 +45,12 @@ def test_six_millimetres_through_a_distorting_lens(board: Board) -> None:
     assert np.sqrt(np.mean(length_errors_um(without, truth) ** 2)) > 20
 
 
+def test_inner_corners_may_be_counted_instead_of_squares() -> None:
+    photo, truth = render_board(CHESSBOARD, VIEW, 1)
+    found = calibrate_plane(photo, Board(13, 9, 8.0), Placing())
+    assert np.sqrt(np.mean(length_errors_um(found, truth) ** 2)) <= 2.0
+
+
 def test_the_plane_is_right_handed_seen_from_above() -> None:
     photo, _ = render_board(CHESSBOARD, VIEW, 1)
     found = calibrate_plane(photo, CHESSBOARD, Placing())
