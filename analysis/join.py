@@ -3,6 +3,7 @@
 Where photo and log are not surely tied to each other (`registration`), nothing is joined.
 """
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +25,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-EFFICIENCY = 0.8
-"""Thermal efficiency of MAG welding, EN 1011-1."""
+EFFICIENCY = {"12": 1.0, "11": 0.8, "13": 0.8, "14": 0.6, "15": 0.6}
+"""Thermal efficiency by EN 1011-1, by the first digits of the process number of ISO 4063."""
+USUAL_EFFICIENCY = 0.8
+"""Of MIG and MAG welding, taken where the session does not say the process."""
 PROCESS = "/weld/process"
 
 
@@ -35,6 +38,7 @@ class Joined:
 
     columns: dict[str, NDArray[Any]]
     tie: Tie
+    heat_rule: str
 
 
 def join_bead(
@@ -58,8 +62,18 @@ def join_bead(
     }
     columns |= _axis(session, stamp_ns) | _process(session, stamp_ns)
     power_kw = columns["current_a"] * columns["voltage_v"] / 1e3
-    columns["heat_kj_mm"] = EFFICIENCY * power_kw / columns["speed_mm_s"]
-    return Joined(columns, tie)
+    process = session.metadata.get("seamlog.weld", {}).get("process", "")
+    efficiency, known = thermal_efficiency(process)
+    columns["heat_kj_mm"] = efficiency * power_kw / columns["speed_mm_s"]
+    said = "" if known else ", process not recorded"
+    return Joined(columns, tie, f"EN 1011-1, thermal efficiency {efficiency:g}{said}")
+
+
+def thermal_efficiency(process: str) -> tuple[float, bool]:
+    """Efficiency of a process whose number stands in this text, and whether it does."""
+    number = re.search(r"(?<!\d)1[1-5]\d?(?!\d)", process)
+    found = EFFICIENCY.get(number[0][:2]) if number else None
+    return (USUAL_EFFICIENCY, False) if found is None else (found, True)
 
 
 def _axis(session: "Session", stamp_ns: NDArray[np.int64]) -> dict[str, Floats]:

@@ -65,7 +65,7 @@ def join_part(
         inputs=list(inputs),
         configuration=config.model_dump(),
         reason="a join is not judged",
-        figures=_figures(tie, band, len(found)),
+        figures=[*_figures(tie, band, len(found)), _heat(columns["heat_kj_mm"], joined.heat_rule)],
         findings=[_finding(columns, weld, band, *item) for item in found],
         details={
             "method": tie.method,
@@ -137,6 +137,17 @@ def _figures(tie: Tie, band: Band, count: int) -> list[Figure]:
             unit="mm", reason=tie.method,
         ),
     ]  # fmt: skip
+
+
+def _heat(heat_kj_mm: Floats, rule: str) -> Figure:
+    known = heat_kj_mm[np.isfinite(heat_kj_mm)]
+    return Figure(
+        name="heat_input_kj_mm",
+        label="Mean heat input",
+        value=float(known.mean()) if len(known) else None,
+        unit="kJ/mm",
+        reason=rule if len(known) else "current and voltage were not logged",
+    )
 
 
 def _finite(value: float) -> float | None:

@@ -12,6 +12,7 @@ import pytest
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead_assess import bead_and_join
 from seamlog.analysis.calibration.table import calibrate_table
+from seamlog.analysis.join import thermal_efficiency
 from seamlog.analysis.registration import tie_bead
 from seamlog.analysis.torch_path import TorchPath
 from seamlog.analysis.virtual_cell.bead_photo import _CORNERS_MM, _CORNERS_PX
@@ -186,3 +187,20 @@ def test_a_photo_in_the_table_frame_is_searched_along_the_logged_seam(
     assert join.details["causes"][0]["channel"] == "weld_speed"
     closest = tables["correlations"][0]["channel"][0]
     assert closest == "weld speed"
+
+
+@pytest.mark.parametrize(
+    ("process", "efficiency", "known"),
+    [
+        ("135 MAG", 0.8, True),
+        ("141", 0.6, True),
+        ("121", 1.0, True),
+        ("MAG welding, short arc (ISO 4063: 135-D)", 0.8, True),
+        ("brazing", 0.8, False),
+        ("", 0.8, False),
+    ],
+)
+def test_thermal_efficiency_goes_by_the_process(
+    process: str, efficiency: float, known: bool
+) -> None:
+    assert thermal_efficiency(process) == (efficiency, known)
