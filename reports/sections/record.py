@@ -91,7 +91,7 @@ def _age(day: Any, end_ns: int | None) -> str | None:
     return f"{days} days (of {made})" if days >= 0 else f"of {made}, after the weld"
 
 
-def _findings(run: Run) -> str | None:
+def _findings(run: Run) -> str:
     """What was found, each with its value and its place."""
     found = [
         (sentence(item), run.place(part, item.place))
@@ -104,7 +104,9 @@ def _findings(run: Run) -> str | None:
         found += [(i.message, i.place) for i in lines if i.severity is not Severity.INFO]
     told = [f"{text} ({place.text})" if place else text for text, place in found[:_MOST_FINDINGS]]
     more = len(found) - len(told)
-    return "; ".join([*told, *([f"{more} more below"] if more else [])]) or "none"
+    judged = any(i.verdict is Verdict.PASS for part in run.parts for i in part.criteria)
+    nothing = "none" if judged else "none; nothing was judged"
+    return "; ".join([*told, *([f"{more} more below"] if more else [])]) or nothing
 
 
 def _stated(run: Run) -> Iterator[tuple[str, str]]:
