@@ -47,7 +47,9 @@ def all_offsets(source: FileSource, entry: ChunkEntry) -> NDArray[np.int64] | No
     if not found or any(rows is None for rows in found):
         return None
     offsets = [np.frombuffer(rows, "<u8")[1::2] for rows in found if rows is not None]
-    return np.sort(np.concatenate(offsets)).astype(np.int64)
+    joined = np.concatenate(offsets).astype(np.int64)
+    is_sorted = (joined[1:] > joined[:-1]).all()
+    return joined if is_sorted else np.sort(joined)
 
 
 def plausible_places(
