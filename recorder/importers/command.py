@@ -10,14 +10,14 @@ import click
 
 from seamlog.command import command, force_option, output_option
 from seamlog.errors import InputError, UsageError
-from seamlog.outcome import Outcome
+from seamlog.outcome import Ending, Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from seamlog.evenness import Evenness
 
-    from .content import Content
+    from .content import Content, Report
     from .conversion import Loss, TopicColumns
 
 BY_SUFFIX = {
@@ -56,7 +56,8 @@ def import_(
 ) -> Outcome:
     """Turn the foreign log FILE (or the folder of a ROS 2 bag) into a session.
 
-    Nothing is derived on the way: what FILE does not have stays NaN and is listed as absent.
+    Nothing is derived on the way: what FILE does not have stays NaN and is listed as absent. Exit
+    code 1 if parts or messages of a bag, or frames of a video, could not be taken.
     """
     from seamlog import plugins
     from seamlog.files import check_output
@@ -72,10 +73,10 @@ def import_(
     if not hasattr(reader, "write"):
         return _import_table(reader, file, target, map_file, guess, force)
     if guess or map_file:
-        with _as_session(reader, file) as (content, copied, notes):
+        with _as_session(reader, file) as (content, copied, report):
             if guess:
                 return _guess(content, file, target)
-            return _import_mapped(content, file, target, map_file, force, copied, notes)
+            return _import_mapped(content, file, target, map_file, force, copied, report.lines)
     return _import_whole(reader, file, target, force)
 
 
@@ -161,13 +162,13 @@ def _import_whole(reader: Any, file: Path, output: Path | None, force: bool) -> 
     with tempfile.TemporaryDirectory() as folder:
         path = output or Path(folder) / "dry.mcap"
         with spinner(f"importing {file}"), BatchWriter(path, force) as writer:
-            notes = reader.write(file, writer)
+            report = reader.write(file, writer)
             writer.add_metadata("seamlog.import", _provenance(file))
-        return _whole_outcome(file, path, output, notes)
+        return _whole_outcome(file, path, output, report)
 
 
 @contextmanager
-def _as_session(reader: Any, file: Path) -> "Iterator[tuple[Content, Path, list[str]]]":
+def _as_session(reader: Any, file: Path) -> "Iterator[tuple[Content, Path, Report]]":
     import tempfile
 
     from seamlog.mcap.batch import BatchWriter
@@ -178,9 +179,9 @@ def _as_session(reader: Any, file: Path) -> "Iterator[tuple[Content, Path, list[
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "whole.mcap"
         with BatchWriter(path) as writer:
-            notes = reader.write(file, writer)
+            report = reader.write(file, writer)
         with open_session(path) as session:
-            yield content_of_session(session), path, notes
+            yield content_of_session(session), path, report
 
 
 def _provenance(file: Path, role: str = "file") -> dict[str, str]:
@@ -190,7 +191,7 @@ def _provenance(file: Path, role: str = "file") -> dict[str, str]:
     return facts | ({f"{role}_sha256": input_of(file).sha256} if file.is_file() else {})
 
 
-def _whole_outcome(file: Path, path: Path, output: Path | None, notes: list[str]) -> Outcome:
+def _whole_outcome(file: Path, path: Path, output: Path | None, report: "Report") -> Outcome:
     from seamlog.session import open_session
 
     with open_session(path) as session:
@@ -200,7 +201,7 @@ def _whole_outcome(file: Path, path: Path, output: Path | None, notes: list[str]
     when = f", {info.duration_s:.3f} s from {_date(info.start_ns)}" if info.message_count else ""
     lines = [head, f"{info.message_count} messages{when}"]
     lines += [f"  {topic}: {count}" for topic, count in rows.items()]
-    lines += notes or ["nothing was lost"]
+    lines += [*report.lines, *([] if report.losses else ["nothing was lost"])]
     document = {
         "file": str(file),
         "session": str(output) if output else None,
@@ -208,9 +209,11 @@ def _whole_outcome(file: Path, path: Path, output: Path | None, notes: list[str]
         "start_ns": info.start_ns,
         "duration_s": info.duration_s,
         "topics": list(rows),
-        "notes": notes,
+        "losses": report.losses,
+        "notes": report.notes,
     }
-    return Outcome("seamlog.import", "\n".join(lines), document)
+    ending = Ending.FINDING if report.losses else Ending.PASS
+    return Outcome("seamlog.import", "\n".join(lines), document, ending)
 
 
 def _outcome(

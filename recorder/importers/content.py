@@ -21,6 +21,19 @@ class Content:
     notes: list[str] = field(default_factory=list)
 
 
+@dataclass
+class Report:
+    """What the import of a whole file decided (`notes`) and what it could not take (`losses`)."""
+
+    notes: list[str] = field(default_factory=list)
+    losses: list[str] = field(default_factory=list)
+
+    @property
+    def lines(self) -> list[str]:
+        """All of it, losses first."""
+        return [*self.losses, *self.notes]
+
+
 def content_of(loaded: Any) -> Content:
     """What `load` gave: a `Content`, or columns alone."""
     return loaded if isinstance(loaded, Content) else Content(loaded)

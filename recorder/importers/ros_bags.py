@@ -14,6 +14,8 @@ from seamlog.mcap.file import McapFile
 from seamlog.mcap.records import Schema
 from seamlog.mcap.streams import MessageStream
 
+from .content import Report
+
 _PATHS = re.compile(r"relative_file_paths:\s*\n((?:\s+- .*\n?)+)")
 _COUNTS = re.compile(r"- path: (?P<path>.*)\n(?:.*\n){1,6}?\s+message_count: (?P<count>\d+)")
 _HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
@@ -26,38 +28,40 @@ class Ros2Importer:
     Parts that are missing are noted with what they held; the rest is imported.
     """
 
-    def write(self, path: Path, writer: BatchWriter) -> list[str]:
+    def write(self, path: Path, writer: BatchWriter) -> Report:
         """Copy all messages into `writer`; what was lost or had to be decided."""
-        files, notes = _files(path)
+        report = Report()
+        files = _files(path, report)
         message_mode = _is_compressed_by_message(path)
-        streams = _Streams(writer, notes)
+        streams = _Streams(writer, report)
         read = 0
         for file in files:
             with _plain(file) as plain:
                 if plain.suffix == ".mcap":
-                    read += _copy_mcap(plain, writer, notes)
+                    read += _copy_mcap(plain, writer, report)
                 else:
                     streams.copy_sqlite(plain, file, message_mode)
                     read += 1
         streams.finish()
         if not read:
-            raise ImportFailed(f"{path}: nothing of this bag can be read; {'; '.join(notes)}")
-        return notes
+            why = "; ".join(report.losses)
+            raise ImportFailed(f"{path}: nothing of this bag can be read; {why}")
+        return report
 
 
 class Ros1Importer:
     """Reads ROS 1 bags; messages become CDR with ROS 2 definitions."""
 
-    def write(self, path: Path, writer: BatchWriter) -> list[str]:
+    def write(self, path: Path, writer: BatchWriter) -> Report:
         """Copy all messages into `writer`; what was lost or had to be decided."""
         rosbag1 = _rosbags("rosbag1", path)
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-        notes: list[str] = []
+        report = Report()
         store = get_typestore(Stores.EMPTY)
         # rosbags drops `seq`, which the header of ROS 1 has, while it converts
         store.register(get_types_from_msg(_HEADER, "std_msgs/msg/Header"))
-        streams = _Streams(writer, notes)
+        streams = _Streams(writer, report)
         try:
             with rosbag1.Reader(path) as reader:
                 for connection in reader.connections:
@@ -74,14 +78,14 @@ class Ros1Importer:
         except Exception as error:
             raise ImportFailed(f"{path} cannot be read as a ROS 1 bag: {error}") from error
         streams.finish()
-        return notes
+        return report
 
 
 class _Streams:
     """Message streams by connection, and what had to be left out."""
 
-    def __init__(self, writer: BatchWriter, notes: list[str]) -> None:
-        self._writer, self._notes = writer, notes
+    def __init__(self, writer: BatchWriter, report: Report) -> None:
+        self._writer, self._report = writer, report
         self._found: dict[tuple[str, str], MessageStream | None] = {}
         self._lost: Counter[tuple[str, str]] = Counter()
 
@@ -110,7 +114,7 @@ class _Streams:
         except Exception as error:
             if not any(self._found.values()):
                 raise ImportFailed(f"{origin} cannot be read as a ROS 2 bag: {error}") from error
-            self._notes.append(f"{origin.name}: reading stopped at a fault: {error}")
+            self._report.losses.append(f"{origin.name}: reading stopped at a fault: {error}")
 
     def _schema(self, connection: Any) -> Schema | None:
         from rosbags.interfaces import MessageDefinitionFormat as Format
@@ -123,7 +127,7 @@ class _Streams:
         store = get_typestore(Stores.LATEST)
         if connection.msgtype not in store.types:
             return None
-        self._notes.append(
+        self._report.notes.append(
             f"{connection.topic}: the bag has no definition of {connection.msgtype}; the one of "
             "ROS 2's own packages, as rosbags knows it, was taken"
         )
@@ -132,7 +136,7 @@ class _Streams:
     def finish(self) -> None:
         """Note what was left out."""
         for (topic, name), count in self._lost.items():
-            self._notes.append(
+            self._report.losses.append(
                 f"{topic}: {count} messages were left out: the bag has no definition of {name}"
             )
 
@@ -153,28 +157,32 @@ def _rosbags(module: str, path: Path) -> Any:
         ) from error
 
 
-def _files(path: Path) -> tuple[list[Path], list[str]]:
-    """Files of the bag in order, and which are missing."""
+def _files(path: Path, report: Report) -> list[Path]:
+    """Files of the bag in order; missing ones are losses."""
     if path.is_file():
-        return [path], _beside(path)
+        report.notes += _beside(path)
+        return [path]
     listing = path / "metadata.yaml"
     if not listing.is_file():
         found = sorted(item for item in path.iterdir() if item.suffix in _BAG_FILES)
         if not found:
             raise ImportFailed(f"{path} is no ROS bag: no metadata.yaml, no .mcap or .db3 file")
-        return found, [f"{path.name} has no metadata.yaml: nothing tells whether parts are missing"]
+        report.notes.append(
+            f"{path.name} has no metadata.yaml: nothing tells whether parts are missing"
+        )
+        return found
     text = listing.read_text(encoding="utf-8", errors="replace")
     match = _PATHS.search(text)
     if match is None:
         raise ImportFailed(f"{listing} lists no files; it is no metadata of a ROS 2 bag")
     names = [_file_name(line) for line in match[1].splitlines() if line.strip()]
     counts = {_file_name(row["path"]): row["count"] for row in _COUNTS.finditer(text)}
-    notes = [
+    report.losses += [
         f"{name} is missing" + (f": {counts[name]} messages" if name in counts else "")
         for name in names
         if not (path / name).is_file()
     ]
-    return [path / name for name in names if (path / name).is_file()], notes
+    return [path / name for name in names if (path / name).is_file()]
 
 
 def _beside(path: Path) -> list[str]:
@@ -219,15 +227,15 @@ def _plain(file: Path) -> Iterator[Path]:
         yield plain
 
 
-def _copy_mcap(path: Path, writer: BatchWriter, notes: list[str]) -> bool:
+def _copy_mcap(path: Path, writer: BatchWriter, report: Report) -> bool:
     try:
         file = McapFile(path)
     except SessionError as error:
-        notes.append(str(error))
+        report.losses.append(str(error))
         return False
     try:
         writer.copy_file(file)
-        notes.extend(file.problems)
+        report.losses += file.problems
     finally:
         file.close()
     return True

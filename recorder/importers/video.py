@@ -12,6 +12,8 @@ from seamlog.mcap.batch import BatchWriter
 from seamlog.mcap.records import Schema
 from seamlog.messages import definition, encode_image
 
+from .content import Report
+
 TOPIC = "/camera/image"
 _QUALITY = 95
 _BARE = ("mjpeg", "h264", "hevc", "m4v", "mpegvideo", "image2", "jpeg_pipe", "png_pipe")
@@ -25,7 +27,7 @@ class VideoImporter:
     plus its presentation time. Motion JPEG is taken over without encoding it anew.
     """
 
-    def write(self, path: Path, writer: BatchWriter) -> list[str]:
+    def write(self, path: Path, writer: BatchWriter) -> Report:
         """Copy all frames into `writer`; what was lost or had to be decided."""
         try:
             import av
@@ -40,7 +42,7 @@ class VideoImporter:
             raise ImportFailed(f"{path} cannot be read as a video: {error}") from error
 
 
-def _copy(container: Any, path: Path, writer: BatchWriter) -> list[str]:
+def _copy(container: Any, path: Path, writer: BatchWriter) -> Report:
     if not container.streams.video:
         raise ImportFailed(f"{path} has no video stream")
     stream = container.streams.video[0]
@@ -63,12 +65,13 @@ def _copy(container: Any, path: Path, writer: BatchWriter) -> list[str]:
         count += 1
     if not count:
         raise ImportFailed(f"{path} holds no frame with a time stamp")
+    report = Report(notes)
     if lost:
-        notes.append(f"{lost} frames without a time stamp were left out")
+        report.losses.append(f"{lost} frames without a time stamp were left out")
     others = len(container.streams) - 1
     if others:
         notes.append(f"{others} other streams (sound, subtitles, more pictures) were left out")
-    return notes
+    return report
 
 
 def _start(container: Any, stream: Any) -> tuple[int, list[str]]:
