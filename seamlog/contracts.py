@@ -150,9 +150,9 @@ class Source(Protocol):
 class Importer(Protocol):
     """Reads a foreign file into named columns; the column map does the rest.
 
-    `load` may also give a `seamlog.recorder.importers.content.Content`, with units, times and notes.
-    An importer of whole recordings has `write(path, writer)` instead, which puts messages into a
-    `seamlog.mcap.batch.BatchWriter` and returns a `Report` of the same module.
+    `load` may also give a `Content` (`seamlog.recorder.importers.content`) with units, times and
+    notes. An importer of whole recordings has `write(path, writer)` instead, which puts messages
+    into a `seamlog.mcap.batch.BatchWriter` and returns a `Report` of the same module.
     """
 
     def load(self, path: Path) -> Mapping[str, NDArray[Any]]:
