@@ -3,13 +3,11 @@
 import os
 import sys
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from seamlog.clock import MonotonicClock
 from seamlog.errors import UsageError
 
-from .accounts import Account, ring_account
 from .channel import Channel, producer_name
 from .folder import OutTray, Recording, is_locked, read_recording, root
 from .producer import Producer
@@ -49,28 +47,10 @@ class JoinedProducer(Producer):
         self._name = name or f"{Path(sys.argv[0]).name or 'python'}-{os.getpid()}"
         self._is_closed = False
 
-    def accounts(self) -> tuple[Account, ...]:
-        """The accounts of this process' channels so far."""
-        return tuple(
-            ring_account(row.topic, row.metadata["producer"], row.gate.ring, row.gate.ring.accepted)
-            for row in list(self._channels.values())
-        )
-
     def close(self) -> None:
         """Take nothing more; what was accepted is written by the recorder process."""
         self._is_closed = True
         self._stop_channels()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _is_alive(self) -> bool:
         try:

@@ -6,7 +6,8 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from threading import get_ident
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 from numpy.typing import NDArray
 
@@ -14,6 +15,7 @@ from seamlog.clock import Clock
 from seamlog.errors import RecordingError, SeamlogError, UsageError
 from seamlog.limits import LIMITS
 
+from .accounts import Account, ring_account
 from .channel import Channel, known_row, make_channel, producer_name
 from .folder import OutTray, Recording
 from .gate import Gate
@@ -101,6 +103,28 @@ class Producer(ABC):
         self._check_open()
         item = {"kind": "trigger", "reason": reason, "log_time_ns": self.clock.now_ns()}
         self._tray.place(item)
+
+    def accounts(self) -> tuple[Account, ...]:
+        """The accounts of this process' own channels so far."""
+        return tuple(
+            ring_account(row.topic, row.metadata["producer"], row.gate.ring, row.gate.ring.accepted)
+            for row in list(self._channels.values())
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @abstractmethod
+    def close(self) -> Any:
+        """Take nothing more."""
 
     def _make_channel(self, key: tuple[str, int], metadata: Mapping[str, str]) -> Channel:
         known_row(key[0])

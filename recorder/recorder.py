@@ -7,14 +7,13 @@ import weakref
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from seamlog.clock import Clock, MonotonicClock
 from seamlog.contracts import Pace
 from seamlog.errors import UsageError
 
-from .accounts import Status, read_account, ring_account
+from .accounts import Status, read_account
 from .folder import RESERVED, OutTray, Recording, abandoned_folders, make_folder, read_recording
 from .launch import WritingProcess, claim_partial
 from .producer import Producer, stop
@@ -96,11 +95,7 @@ class Recorder(Producer):
             return self._final
         alive = self._process.is_alive()
         findings = self._findings() if alive else (*self._findings(), self._lost_process())
-        rows = tuple(
-            ring_account(row.topic, row.metadata["producer"], row.gate.ring, row.gate.ring.accepted)
-            for row in list(self._channels.values())
-        )
-        return Status(self.id, str(self.path), alive, rows, findings, sync=self._sync)
+        return Status(self.id, str(self.path), alive, self.accounts(), findings, sync=self._sync)
 
     def close(self) -> Status:
         """End the recording: all that was accepted is in the file, the file has its name.
@@ -114,17 +109,6 @@ class Recorder(Producer):
             _living.discard(self)
             _tell(self._final, self._heard)
         return self._final
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _is_alive(self) -> bool:
         return self._process.is_alive()

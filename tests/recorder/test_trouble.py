@@ -22,7 +22,7 @@ from seamlog.recorder import Recorder
 resource.setrlimit(resource.RLIMIT_FSIZE, (5 << 19, 5 << 19))
 recorder = Recorder(sys.argv[1], pace="simulated")
 encoder = recorder.channel("/table/encoder")
-for number in range(250_000):
+for number in range(150_000):
     encoder.put(number, random.random(), random.random())
 status = recorder.close()
 (row,) = status.channels
@@ -36,16 +36,16 @@ def test_a_file_that_may_not_grow_ends_whole_and_another_goes_on(tmp_path: Path)
     command = [sys.executable, "-c", SMALL_FILES, str(path)]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=90)
     told = json.loads(done.stdout)
-    assert (told["accepted"], told["written"], told["lost"]) == (250_000, 250_000, 0)
+    assert (told["accepted"], told["written"], told["lost"]) == (150_000, 150_000, 0)
     names = ["weld.mcap", *(f"weld.{n:04}.mcap" for n in range(2, len(told["files"]) + 1))]
     assert [Path(file).name for file in told["files"]] == names
-    assert len(names) > 3
+    assert len(names) >= 2
     assert all("goes on in a new file" in finding for finding in told["findings"])
     with open_session(path) as session:
-        assert session.columns("/table/encoder")["stamp_ns"].tolist() == list(range(250_000))
+        assert session.columns("/table/encoder")["stamp_ns"].tolist() == list(range(150_000))
         assert session.problems == []
     counts = [len(read_session(Path(file))["/table/encoder"]) for file in told["files"]]
-    assert sum(counts) == 250_000
+    assert sum(counts) == 150_000
 
 
 def test_rings_of_dead_recordings_are_found_and_kept_while_they_are_of_use(
