@@ -21,7 +21,9 @@ from seamlog.errors import ChannelMissing, SessionError, UnknownName
 from seamlog.limits import LIMITS, Limits
 from seamlog.mcap.attachments import Attachments
 from seamlog.mcap.columns import LOG_TIME, STAMP, Columns, by_log_time, is_in_order
+from seamlog.mcap.decoders import TYPED
 from seamlog.mcap.file import ENDLESS, McapFile
+from seamlog.mcap.one_by_one import filled
 from seamlog.mcap.records import ChannelRecord
 from seamlog.migrate import FORMAT, format_of, migrated
 from seamlog.segments import PROBLEMS, RECORDING, find_segments, grown_segments, is_live
@@ -137,6 +139,8 @@ class Session:
         jumbled = [place for place, part in enumerate(parts) if not is_in_order(part)]
         if len(parts) == 1 and not jumbled:
             return parts[0]
+        if all(row.message_encoding not in TYPED for _, row in rows):
+            parts = filled(parts)
         joined = _joined(parts, f"{self.path}: {topic}")
         kept = [rows[at][0].kept_order(rows[at][1], parts[at], self.span) for at in jumbled]
         return joined if any(kept) else by_log_time(joined)

@@ -25,6 +25,9 @@ OWN = {
 }
 """Our own, found without `entry_points()`, which would cost more than opening a file."""
 
+TYPED = ("cdr", "protobuf", "ros1")
+"""Encodings whose definitions say which fields there are; others may have any in any message."""
+
 
 def decoder_of(channel: ChannelRecord, schema: Schema | None, where: str) -> Decoder:
     """The decoder of a channel; `SessionError` if there is none or its schema cannot be used."""

@@ -1,7 +1,7 @@
 """Columns of messages that are decoded one after the other: JSON, and decoders of others."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -87,3 +87,19 @@ def _column(values: list[Any]) -> NDArray[Any]:
         except OverflowError:
             return objects(values)
     return objects(values)
+
+
+def filled(parts: Sequence[Columns]) -> list[Columns]:
+    """Parts of one topic with the same columns: what one lacks is NaN, or None."""
+    names = list(dict.fromkeys(name for part in parts for name in part))
+    kinds = {name: {part[name].dtype.kind for part in parts if name in part} for name in names}
+    found = []
+    for part in parts:
+        count = len(part[LOG_TIME])
+        lacking = {
+            name: np.full(count, np.nan) if kinds[name] <= set("iuf") else np.full(count, None)
+            for name in names
+            if name not in part
+        }
+        found.append({name: (part | lacking)[name] for name in names})
+    return found

@@ -122,3 +122,15 @@ def test_definitions_in_idl_are_read(tmp_path: Path) -> None:
     )
     found = columns(write(tmp_path / "x.mcap", "cdr", ("a/msg/B", "ros2idl", text), [payload]))
     assert (found["x"][0], found["y"][0].tolist(), found["s"][0]) == (1.0, [5, 6], "z")
+
+
+def test_files_whose_messages_have_other_keys_are_one_session(tmp_path: Path) -> None:
+    paths = [
+        write(tmp_path / f"{name}.mcap", "json", ("s", "jsonschema", b"{}"), [text])
+        for name, text in (("a", b'{"x": 1, "y": 2}'), ("b", b'{"x": 3, "word": "ab"}'))
+    ]
+    with seamlog.open_session(paths) as session:
+        found = session.columns("/x")
+    assert found["x"].tolist() == [1, 3]
+    assert str(found["y"].tolist()) == "[2.0, nan]"
+    assert found["word"].tolist() == [None, "ab"]
