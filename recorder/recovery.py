@@ -223,7 +223,7 @@ class _Recovery:
             elif number in accounts:
                 row.lost = accounts[number].lost
             elif missing := self._missing.get(number):
-                row.lost = max(0, missing - self._dropped(row.topic))
+                row.lost = max(0, missing - self._left_out(row.topic))
         for number, count in index.expected.items():
             if number not in self._rows and count:
                 channel = index.channels.get(number)
@@ -233,14 +233,15 @@ class _Recovery:
             text for text in index.problems if index.gaps or index.left_out or "first bytes" in text
         ]
 
-    def _dropped(self, topic: str) -> int:
-        """How many messages of a topic never got in, by the last accounts that are readable."""
+    def _left_out(self, topic: str) -> int:
+        """Messages of a topic that were never to be in the file, by the last accounts readable."""
         with open_session(self.result.source) as session:
             if session.schema(_STATUS) is None:
                 return 0
-            columns = session.columns(_STATUS, ["topic", "dropped"])
-        pairs = zip(columns["topic"], columns["dropped"].tolist(), strict=True)
-        return max((count for name, count in pairs if name == topic), default=0)
+            columns = session.columns(_STATUS)
+        mine = np.flatnonzero([name == topic for name in columns["topic"]])
+        names = [name for name in ("dropped", "discarded") if name in columns]
+        return sum(int(columns[name][mine].max(initial=0)) for name in names)
 
     def _sign(self, file: RecoveredFile) -> None:
         names = {name for name, _ in _metadata(self._source, self._index)}

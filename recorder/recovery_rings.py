@@ -157,7 +157,7 @@ def _final(feed: Feed, missing: int, in_snapshots: bool) -> Account:
     """Accepted = written + lost; with all rings drained, what is not lost has been written."""
     ring = feed.ring
     account = ring_account(feed.topic, feed.account().producer, ring, ring.accepted)
-    lost = account.lost + max(0, missing - account.dropped)
+    lost = account.lost + max(0, missing - account.dropped - account.discarded)
     if in_snapshots:
         # What waited in the memory of the recorder process belonged to no snapshot yet.
         rest = account.accepted - account.written - lost

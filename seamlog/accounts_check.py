@@ -1,7 +1,8 @@
 """The recorder's own accounts and events in a session, against what is in its files."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,17 @@ def iter_account_findings(session: Session, courses: Courses) -> Iterator[Findin
     yield from _clock_steps(session)
     for row in _last_accounts(session):
         yield from _account(session, row, courses)
+
+
+def without_discarded(session: Session, findings: Iterable[Finding]) -> Iterator[Finding]:
+    """`findings`, where gaps between snapshots are no errors."""
+    discarded = {row["topic"] for row in _last_accounts(session) if row["discarded"]}
+    for finding in findings:
+        if finding.id == "sequence-gap" and finding.topic in discarded:
+            cause = f"{finding.cause} or, most likely, are part of no snapshot"
+            yield replace(finding, severity=Severity.NOTE, cause=cause)
+        else:
+            yield finding
 
 
 def _files(session: Session) -> Iterator[Finding]:
@@ -107,10 +119,10 @@ def _last_accounts(session: Session) -> list[dict[str, Any]]:
         if same and same[-1]["log_time_ns"] != row["log_time_ns"]:
             same.clear()
         same.append(row)
-    names = ("offered", "accepted", *_SHORTFALLS, "written")
+    names = ("offered", "accepted", *_SHORTFALLS, "written", "discarded")
     return [
         {"topic": topic, "log_time_ns": int(same[0]["log_time_ns"])}
-        | {name: sum(int(row[name]) for row in same) for name in names}
+        | {name: sum(int(row.get(name, 0)) for row in same) for name in names}
         for topic, same in newest.items()
     ]
 

@@ -41,7 +41,7 @@ def doctor(session: Path) -> Outcome:
 
 def examine(session: "Session") -> "Iterator[Finding]":
     """All that is wrong with an open session, file by file, then across them."""
-    from seamlog.accounts_check import iter_account_findings
+    from seamlog.accounts_check import iter_account_findings, without_discarded
     from seamlog.mcap.channel_course import Courses
     from seamlog.mcap.examine import Examination
     from seamlog.mcap.examine_chunks import ChunkExamination
@@ -50,7 +50,7 @@ def examine(session: "Session") -> "Iterator[Finding]":
     for file in session.files:
         frame = Examination(file.source, file.index, session.limits)
         yield from frame.iter_findings()
-        yield from ChunkExamination(frame, courses).iter_findings()
+        yield from without_discarded(session, ChunkExamination(frame, courses).iter_findings())
     yield from iter_account_findings(session, courses)
 
 

@@ -25,7 +25,6 @@ class Course:
     """One channel so far."""
 
     count: int = 0
-    missing: int = 0
     _tail: NDArray[Any] | None = field(default=None, repr=False)
 
     def joined(self, heads: NDArray[Any]) -> NDArray[Any]:
@@ -62,7 +61,7 @@ class Courses:
         if len(heads) < 2:
             return
         place = {"topic": channel.topic, "offset": entry.offset, "length": entry.length}
-        yield from _sequence_gaps(frame, course, heads, place)
+        yield from _sequence_gaps(frame, heads, place)
         yield from _source_steps(frame, heads, place)
         if key[1]:
             yield from _backwards(frame, heads, place)
@@ -86,13 +85,12 @@ def iter_missing(heads: NDArray[Any]) -> Iterator[tuple[int, int]]:
 
 
 def _sequence_gaps(
-    frame: "Examination", course: Course, heads: NDArray[Any], place: dict[str, Any]
+    frame: "Examination", heads: NDArray[Any], place: dict[str, Any]
 ) -> Iterator[Finding]:
     for at, missing in iter_missing(heads):
         span = {"start_ns": int(heads["log_time"][at]), "end_ns": int(heads["log_time"][at + 1])}
         pair = f"{heads['sequence'][at]} to {heads['sequence'][at + 1]}"
         if missing > 0:
-            course.missing += missing
             cause = f"sequence {pair}: {missing} messages were dropped or lost here"
             action = "see the recorder's accounts; a faster disk or fewer topics avoid drops"
             yield frame.finding("sequence-gap", Severity.ERROR, cause, action, **place, **span)

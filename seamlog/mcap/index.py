@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from zlib_ng.zlib_ng import crc32
 
-from seamlog.errors import SessionError
+from seamlog.errors import LimitExceeded, SessionError
 from seamlog.limits import LIMITS, Limits
 from seamlog.mcap import parsing, records
 from seamlog.mcap.chunks import check_expansion
@@ -155,7 +155,12 @@ def _read_summary(source: FileSource, start: int, index: FileIndex, limits: Limi
             raise Malformed("its index lists more chunks than fit into the file")
     _check_entries(source, index.chunks)
     most = limits.chunk_bytes
-    check_expansion(source, sum(min(row.uncompressed_size, most) for row in index.chunks), limits)
+    try:
+        check_expansion(
+            source, sum(min(row.uncompressed_size, most) for row in index.chunks), limits
+        )
+    except LimitExceeded as error:
+        raise Malformed(str(error)) from error
 
 
 def _check_entries(source: FileSource, chunks: list[ChunkEntry]) -> None:

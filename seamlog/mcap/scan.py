@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seamlog.errors import SessionError
+from seamlog.errors import LimitExceeded, SessionError
 from seamlog.limits import Limits
 from seamlog.mcap import parsing, records
 from seamlog.mcap.chunks import BARE, check_expansion, read_chunk
+from seamlog.mcap.compression import COMPRESSIONS, can_hold
 from seamlog.mcap.heads import message_heads
 from seamlog.mcap.index import FileIndex, read_header, walk
 from seamlog.mcap.records import ChunkEntry, Malformed
@@ -104,6 +105,7 @@ class _Scanner:
         self._counts: dict[int, int] = {}
         self._bare: list[int] = []
         self._unpacked = 0
+        self._beyond: LimitExceeded | None = None
 
     def run(self) -> None:
         at: int | None = len(records.MAGIC)
@@ -114,6 +116,8 @@ class _Scanner:
             lost, at = error, self._resume(0, 0)
         while at is not None:
             at = self._walk(at)
+        if self._beyond is not None and not self.index.chunks:
+            raise self._beyond
         if lost is not None:
             if not self.index.chunks and not self.index.attachments:
                 raise lost
@@ -158,7 +162,7 @@ class _Scanner:
             self.index.gaps.append((gap, end))
         return found
 
-    def _leave_out(self, what: str, offset: int, length: int, error: Malformed) -> None:
+    def _leave_out(self, what: str, offset: int, length: int, error: Exception) -> None:
         self.index.left_out.append((offset, length, str(error)))
         self.index.problems.append(
             f"{self.source.path}: the {what} at byte {offset} ({length} bytes) is damaged and was "
@@ -250,9 +254,11 @@ class _Scanner:
         ):
             try:
                 entry = self._learn(entry)
-            except Malformed as error:
+            except (Malformed, LimitExceeded) as error:
                 self._counts = {}
                 self._leave_out("chunk", entry.offset, entry.length, error)
+                if isinstance(error, LimitExceeded):
+                    self._beyond = error
                 return
         self._note(entry, self._counts)
 
@@ -299,6 +305,10 @@ def _entry(offset: int, length: int, content: memoryview) -> ChunkEntry:
     head = parsing.parse_chunk_head(content)
     if head.data_offset + head.data_size != len(content):
         raise Malformed("a chunk's data does not fill its record")
+    if head.compression in COMPRESSIONS and not can_hold(
+        content[head.data_offset :], head.compression, head.uncompressed_size
+    ):
+        raise Malformed(f"its data is not what unpacks to {head.uncompressed_size} bytes")
     return ChunkEntry(
         head.start_ns,
         head.end_ns,

@@ -16,9 +16,11 @@ from zlib_ng.zlib_ng import crc32
 from seamlog import open_session
 from seamlog.cli import run
 from seamlog.mcap import records
-from seamlog.recorder import Recorder
+from seamlog.recorder import Recorder, Snapshot
+from seamlog.recorder.recovery import recover
 from seamlog.recorder.storage import Storage
 from tests.core.scenarios import SCENARIOS, picture, write_live
+from tests.recorder.test_snapshot import SimulatedLoop, run_in_parts
 
 Document = dict[str, Any]
 Examine = Callable[[Path], Document]
@@ -190,6 +192,20 @@ def test_a_session_that_is_being_recorded(tmp_path: Path, examine: Examine) -> N
             time.sleep(0.01)
         assert run(["doctor", str(partial)]) == 0
     assert ids(examine(tmp_path / "weld.mcap")) == set()
+
+
+def test_gaps_between_snapshots_are_no_fault(tmp_path: Path, examine: Examine) -> None:
+    loop = SimulatedLoop(tmp_path / "weld.mcap", Snapshot(0.5, 0.5))
+    for _ in range(3):
+        run_in_parts(loop, 300)
+        loop.events.put(loop.step, 3, "fault")
+        run_in_parts(loop, 200)
+    loop.close()
+    document = examine(tmp_path / "weld.mcap")
+    # The stamps of this loop count steps and are no times.
+    assert ids(document) <= {"clock-step"}
+    assert any("part of no snapshot" in row["cause"] for row in document["findings"])
+    assert recover(tmp_path / "weld.mcap").is_complete
 
 
 def test_a_file_of_the_row_is_missing(tmp_path: Path, examine: Examine) -> None:
