@@ -18,6 +18,8 @@ from seamlog.outcome import Ending, Outcome
 if TYPE_CHECKING:
     from seamlog.results import Figure, Part
 
+_OF_BEADS = {"surface", "quality", "join"}
+"""Parts that go with photos: those of older photos or limits must not stay beside new ones."""
 _TOLD = {
     "health": ("messages", "dropped", "lost", "gaps"),
     "tracking": ("rms_error_mm", "peak_error_mm", "mean_weld_speed_mm_s"),
@@ -62,7 +64,8 @@ def analyze(
     with open_session(session) as opened:
         found = assess_session(opened, options)
     results = Results.create(output)
-    _remove_old(output, {part.part for part, _, _ in found})
+    kinds = {part.part for part, _, _ in found}
+    _remove_old(output, kinds | (_OF_BEADS if "bead" in kinds else set()))
     parts = [results.write(part, tables, pictures) for part, tables, pictures in found]
     return _outcome(output, parts)
 

@@ -35,7 +35,6 @@ def spattered(scene: Scene, drops: int, seed: int) -> Spattered:
     picture = bare.pixels.astype(np.float64)
     seam_mm = np.column_stack([bare.x_mm, bare.y_mm])
     widest = float(max(bare.left_mm.max(), bare.right_mm.max()))
-    rows, columns = np.indices(picture.shape)
     found: list[tuple[float, float, float, float]] = []
     while len(found) < drops:
         x, y = rng.uniform(0, picture.shape[1]), rng.uniform(0, picture.shape[0])
@@ -44,12 +43,19 @@ def spattered(scene: Scene, drops: int, seed: int) -> Spattered:
         if widest + radius < away < widest + 10:
             grey = float(rng.choice([-50.0, 70.0]))
             reach = radius / scene.mm_per_px
-            picture += grey * np.clip(reach + 0.5 - np.hypot(columns - x, rows - y), 0, 1)
+            _draw(picture, x, y, reach, grey)
             found.append((x, y, reach, grey))
     photo = _photographed(picture, scene, rng)
     measured = measure_strip(photo, plane, bare.wandering_path(seed=seed))
     clean = _photographed(bare.pixels.astype(np.float64), scene, rng)
     return Spattered(photo, plane, measured, np.array(found).reshape(-1, 4), clean)
+
+
+def _draw(picture: NDArray[np.float64], x: float, y: float, radius: float, grey: float) -> None:
+    top, left = max(0, int(y - radius) - 1), max(0, int(x - radius) - 1)
+    patch = picture[top : int(y + radius) + 3, left : int(x + radius) + 3]
+    rows, columns = np.indices(patch.shape)
+    patch += grey * np.clip(radius + 0.5 - np.hypot(columns + left - x, rows + top - y), 0, 1)
 
 
 def _photographed(picture: NDArray[np.float64], scene: Scene, rng: np.random.Generator) -> Photo:

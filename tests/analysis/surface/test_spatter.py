@@ -10,15 +10,15 @@ from seamlog.analysis.surface.spatter import find_spatter
 from seamlog.analysis.surface.synthetic_spatter import matched, spattered
 from seamlog.errors import EvidenceError
 
-PLAIN = Scene(noise=2)
-TEXTURED = Scene(noise=2, texture=8, haz=35, gradient=0.4)
+PLAIN = Scene(width_px=640, noise=2)
+TEXTURED = Scene(width_px=640, noise=2, texture=8, haz=35, gradient=0.4)
 
 
 @pytest.mark.parametrize(("scene", "least"), [(PLAIN, 0.95), (TEXTURED, 0.92)])
 def test_drops_are_found_on_plain_and_textured_plate(scene: Scene, least: float) -> None:
     scores = []
     for seed in (0, 1):
-        case = spattered(scene, 60, seed)
+        case = spattered(scene, 40, seed)
         found = find_spatter(case.photo, case.plane, case.bead)
         hits = matched(found.blobs.x_px, found.blobs.y_px, case.drops)
         scores.append(2 * hits / (len(found.blobs) + len(case.drops)))
@@ -48,7 +48,7 @@ def test_a_plate_without_spatter_has_none() -> None:
 
 def test_marks_from_before_welding_do_not_count() -> None:
     """Half of the drops are on the photo from before, which was taken a little aside."""
-    case = spattered(Scene(noise=2, texture=6), 40, 7)
+    case = spattered(Scene(width_px=800, noise=2, texture=6), 40, 7)
     before = np.roll(case.photo.pixels, (6, -9), axis=(0, 1)).copy()
     hidden = before.shape[1] // 2
     before[:, hidden:] = np.roll(case.clean.pixels, (6, -9), axis=(0, 1))[:, hidden:]
