@@ -24,7 +24,7 @@ from .put_source import Put, Stop
 from .ring import Ring, create_ring
 from .varying import Encode, VaryingWriter
 
-_FRAME_RING_BYTES = 64 << 20
+_FRAME_RING_BYTES = 128 << 20
 _SMALL_FRAME_RING_BYTES = 16 << 20
 """Where shared memory is scarce, as in containers with 64 MiB of it."""
 _FRAME_SHARE = 0.75
