@@ -65,7 +65,7 @@ class Report:
         self.runs.append(Run(results, len(self.runs)))
 
     def add_section(self, name: str, title: str, blocks: Sequence[AnyBlock]) -> None:
-        """Put a section of your own behind the verdict's; `name` is its anchor in the page."""
+        """Put a section of your own behind all others; `name` is its anchor in the page."""
         names = {section.name for section in self._added} | set(TITLES)
         if anchor(name) in names:
             raise UsageError(
@@ -144,7 +144,7 @@ class Report:
         return next(name for name in names if name not in taken)
 
     def _ordered(self) -> list[Section]:
-        """The verdict, then what was added, where nothing else was taken in; else added last."""
+        """What was added last; first, where only some plug-ins were asked for."""
         made = self._sections()
         if self._chosen is None:
             return [*made, *self._added]
