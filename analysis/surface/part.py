@@ -97,7 +97,7 @@ def _spatter_figures(spatter: Spatter | None, refusal: str, bead: BeadMeasuremen
     labels = {
         "spatter_count": ("Spatter, number", "1"),
         f"spatter_area_{unit}2": ("Spatter, area", f"{unit}^2"),
-        "spatter_per_100mm": ("Spatter per 100 mm of bead", "1/100 mm"),
+        "spatter_per_100mm": ("Spatter per 100 mm of bead, number", "1"),
         f"spatter_largest_{unit}": ("Spatter, largest diameter", unit),
         f"spatter_distance_{unit}": ("Spatter, median distance to the toe", unit),
     }
