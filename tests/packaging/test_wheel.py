@@ -22,7 +22,8 @@ def test_holds_every_module_and_nothing_else(
     wanted = {"seamlog/py.typed"}
     for name in settings["tool"]["setuptools"]["packages"]:
         folder = Path(*name.split("."))
-        wanted |= {str(folder / path.name) for path in (tree / folder).glob("*.py")}
+        files = (tree / folder).glob("*.*")
+        wanted |= {str(folder / path.name) for path in files if path.suffix in (".py", ".toml")}
     for kind in ("templates", "assets"):
         found = (tree / "reports" / kind).rglob("*")
         wanted |= {f"seamlog/{path.relative_to(tree)}" for path in found if path.is_file()}
