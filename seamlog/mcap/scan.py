@@ -113,7 +113,7 @@ class _Scanner:
         try:
             self.index.profile, self.index.library = read_header(self.source)
         except SessionError as error:
-            lost, at = error, self._resume(0, 0)
+            lost, at = error, self._resume(0, self._salvage.next_proved(0))
         while at is not None:
             at = self._walk(at)
         if self._beyond is not None and not self.index.chunks:
@@ -146,17 +146,22 @@ class _Scanner:
         return None
 
     def _go_on(self, at: int, error: Malformed) -> int | None:
-        """Behind a record whose frame holds, else behind the next proved one's beginning."""
+        """Behind a record whose frame holds, else at the next proved one.
+
+        A frame holds if a record follows it and no proved one lies inside it.
+        """
         data, size = self.source.data, self.source.size
+        found = self._salvage.next_proved(at + 1)
         if _is_head(data, at, size):
             length = _HEAD + int(records.RECORD_HEAD.unpack_from(data, at)[1])
-            if at + length == size or _is_head(data, at + length, size):
+            end = at + length
+            is_framed = end == size or _is_head(data, end, size)
+            if is_framed and (found is None or found >= end):
                 self._leave_out("record", at, length, error)
-                return at + length
-        return self._resume(at, at + 1)
+                return end
+        return self._resume(at, found)
 
-    def _resume(self, gap: int, start: int) -> int | None:
-        found = self._salvage.next_proved(start)
+    def _resume(self, gap: int, found: int | None) -> int | None:
         end = self.source.size if found is None else found
         if end > gap:
             self.index.gaps.append((gap, end))
@@ -192,7 +197,7 @@ class _Scanner:
         elif opcode == records.METADATA:
             name, _ = parsing.parse_metadata(content)
             self.index.metadata.append(records.MetadataEntry(offset, length, name))
-        elif opcode != records.HEADER and opcode < _PRIVATE:
+        elif opcode < _PRIVATE and (opcode, offset) != (records.HEADER, len(records.MAGIC)):
             raise Malformed(f"no record of kind {opcode} belongs here")
 
     def _take_message_index(self, offset: int, length: int, content: memoryview) -> None:
