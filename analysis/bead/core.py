@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .band import BandSearch
-from .curve import fit_centreline
+from .curve import Centreline, fit_centreline
 from .features import smoothed, strip_features
 from .image import Photo
 from .plane import Plane, Points
-from .refine import projection
-from .sampling import Strip, sample_strip
-from .toes import Extent
+from .refine import along_rows
+from .sampling import sample_offsets, sample_strip
 from .width import Toes
+from .zones import fisher_direction
 
 Floats = NDArray[np.float64]
 
@@ -53,27 +53,33 @@ def band_inside(
     return points, float(np.median(band.right - band.left)) / 2 * step
 
 
-def softness(strip: Strip, extent: Extent, toes: tuple[Toes, Toes]) -> tuple[float, float]:
-    """Columns that the change at each toe would take at its steepest: left, right.
+def softness(
+    photo: Photo, plane: Plane, line: Centreline, toes: tuple[Toes, Toes], unit: float
+) -> tuple[float, float]:
+    """Px that the change at each toe would take at its steepest: left, right.
 
-    The median over the rows; a change without an end within a fifth of the half width counts as
-    far as that.
+    The median over the stations of `line`; a change without an end within a fifth of the half
+    width counts as far as that.
     """
-    smooth = smoothed(strip.opponent, 0, 4.0)
-    reach = int(max(6, 0.2 * float(np.median(extent.half))))
+    half_px = float(np.median(toes[1].offset - toes[0].offset)) / 2 / unit
+    reach = int(max(6, 0.2 * half_px))
     sides = []
-    for side, edge, toe in ((-1, extent.left, toes[0]), (1, extent.right, toes[1])):
-        signal, _ = projection(smooth, strip.valid, edge, side, extent)
-        sides.append(_columns_of_change(signal, strip.column(toe.offset), reach))
+    for side, toe in ((-1, toes[0]), (1, toes[1])):
+        columns = np.arange(-reach, reach + 1)
+        offsets = toe.offset[:, None] - side * unit * columns
+        pixels, valid = sample_offsets(photo, plane, line, offsets)
+        smooth = along_rows(pixels, 2.0)
+        inside, outside = (
+            smooth[:, part][valid[:, part]] for part in (slice(reach + 1, None), slice(0, reach))
+        )
+        direction = fisher_direction(inside, outside)[0].astype(np.float32)
+        sides.append(_columns_of_change(smooth @ direction, reach))
     return sides[0], sides[1]
 
 
-def _columns_of_change(signal: NDArray[np.float32], edge: Floats, reach: int) -> float:
-    calm = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.0, sigmaY=0.01)
-    around = np.rint(edge).astype(int)[:, None] + np.arange(-reach, reach + 1)
-    columns = np.clip(around, 0, calm.shape[1] - 1)
-    profile = calm[np.arange(len(edge))[:, None], columns]
+def _columns_of_change(profile: NDArray[np.float32], reach: int) -> float:
+    calm = cv2.GaussianBlur(profile, (0, 0), sigmaX=1.0, sigmaY=0.01)
     level = max(2, reach // 4)
-    change = np.abs(profile[:, :level].mean(axis=1) - profile[:, -level:].mean(axis=1))
-    steepest = np.abs(np.gradient(profile, axis=1)).max(axis=1)
+    change = np.abs(calm[:, :level].mean(axis=1) - calm[:, -level:].mean(axis=1))
+    steepest = np.abs(np.gradient(calm, axis=1)).max(axis=1)
     return float(np.median(change / np.maximum(steepest, 1e-3)))

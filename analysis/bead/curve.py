@@ -1,4 +1,4 @@
-"""The centreline: a cubic B-spline through path points, walked at even arc length."""
+"""The centreline: a B-spline through path points, walked at even arc length."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,11 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from .plane import Points
 
 Floats = NDArray[np.float64]
+
+_DEGREE = 5
+"""A stiff curve follows a seam's bends and not the unevenness of its toes."""
+_ENOUGH = 60
+"""Points from which on a curve is that stiff; fewer do not tie it down."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +31,11 @@ class Centreline:
         """Places moved along their normals by `offset` (n,)."""
         return np.asarray(self.points + offset[:, None] * self.normals)
 
+    def every(self, count: int) -> "Centreline":
+        """Each `count`-th place, the first in the middle of the first `count`."""
+        pick = slice(count // 2, None, count)
+        return Centreline(self.s[pick], self.points[pick], self.normals[pick])
+
 
 def arc_length(points: Points) -> Floats:
     """Length along a polyline from its first point."""
@@ -34,7 +44,10 @@ def arc_length(points: Points) -> Floats:
 
 
 def fit_centreline(path: Points, step: float, knot_spacing: float) -> Centreline:
-    """Least-squares B-spline through `path` (n, 2), n >= 2, with a knot every `knot_spacing`."""
+    """Least-squares B-spline through `path` (n, 2), n >= 2, with a knot every `knot_spacing`.
+
+    Where points are missing there are fewer knots.
+    """
     length = arc_length(path)
     keep = np.concatenate([[True], np.diff(length) > 1e-9])
     path, length = path[keep], length[keep]
@@ -55,7 +68,8 @@ def _spline(path: Points, length: Floats, knot_spacing: float) -> BSpline:
             [np.interp(np.linspace(0, length[-1], 16), length, column) for column in path.T]
         )
         length = np.linspace(0, length[-1], 16)
-    inner = max(0, min(int(length[-1] / knot_spacing) - 1, len(path) // 4))
-    places = np.linspace(0.0, length[-1], inner + 2)
-    knots = np.concatenate([[0.0] * 3, places, [length[-1]] * 3])
-    return make_lsq_spline(length, path, knots, k=3)
+    degree = _DEGREE if len(path) >= _ENOUGH else 3
+    inner = max(0, min(int(length[-1] / knot_spacing) - 1, len(path) // 6))
+    places = np.quantile(length, np.linspace(0.0, 1.0, inner + 2))
+    knots = np.concatenate([[0.0] * degree, places, [length[-1]] * degree])
+    return make_lsq_spline(length, path, knots, k=degree)

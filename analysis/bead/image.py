@@ -43,17 +43,21 @@ class Photo:
 
         Grey photos have one channel only, shape (rows, columns, 1).
         """
-        part = self.pixels[rows, columns]
-        scale = np.float32(1 / 257 if part.dtype == np.uint16 else 1)
-        if part.ndim == 2:
-            return np.asarray(part, dtype=np.float32)[..., None] * scale
-        return cv2.transform(np.asarray(part, dtype=np.float32), OPPONENT * scale)
+        return opponent(self.pixels[rows, columns])
 
     def as_bgr8(self) -> NDArray[np.uint8]:
         """A copy for drawing, uint8 (rows, columns, 3)."""
         pixels = self.pixels if self.pixels.dtype == np.uint8 else (self.pixels >> 8)
         whole = cv2.cvtColor(pixels, cv2.COLOR_GRAY2BGR) if pixels.ndim == 2 else pixels
         return np.array(whole, dtype=np.uint8)
+
+
+def opponent(pixels: NDArray[Any]) -> NDArray[np.float32]:
+    """uint8 or uint16 pixels as float32 (rows, columns, 3 or 1): see `Photo.opponent`."""
+    scale = np.float32(1 / 257 if pixels.dtype == np.uint16 else 1)
+    if pixels.ndim == 2:
+        return np.asarray(pixels, dtype=np.float32)[..., None] * scale
+    return np.asarray(cv2.transform(np.asarray(pixels, dtype=np.float32), OPPONENT * scale))
 
 
 def load_photo(path: Path, limits: Limits = LIMITS) -> Photo:

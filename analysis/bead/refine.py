@@ -1,79 +1,204 @@
-"""From the toes of the reduced strip to sub-pixel ones in a strip at the photo's own resolution."""
+"""From coarse toes to sub-pixel ones, in windows along each toe at the photo's own resolution."""
+
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from seamlog.errors import EvidenceError
 
 from .chain import best_chain
-from .edge_model import EdgePlaces, locate_edges
-from .features import Features, smoothed
-from .sampling import Strip
-from .toes import Extent
+from .curve import Centreline
+from .edge_model import (
+    EdgeModel,
+    EdgePlaces,
+    Window,
+    choose_model,
+    locate_edges,
+)
+from .image import Photo
+from .plane import Plane
+from .sampling import sample_offsets
 from .width import Toes
-from .zones import fisher_direction, zone
+from .zones import fisher_direction
 
 Floats = NDArray[np.float64]
+Signal = NDArray[np.float32]
 
-_ALONG_PX = 2.0
+_ALONG_PX = 4.0
 _ALONG_WIDTHS = 0.03
-"""Gaussian averaging along the seam: this many px, or this part of the width if that is more."""
+"""Gaussian averaging along the seam: this many px at most, or this part of the width if more."""
+_SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18)
+"""Parts of the longest averaging that are tried."""
+_CALM = 1.5
+"""Windows follow the coarse toe averaged over this many longest averagings: what they average
+must lie along a straight line."""
+_WINDOW_PX = 18
+_TRIED_ROWS = 160
+_SENSOR_PX = 0.04
+"""Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
+_RASTER_PX = 0.02
+"""What is left of it, and of the unknown shape of the blur, at the longest: standard uncertainty."""
+_ENOUGH = 64
 
 
-def refine_toes(strip: Strip, extent: Extent, unit: float) -> tuple[Toes, Toes]:
-    """Sub-pixel toes of both sides, in offsets."""
-    width_px = 2 * float(np.median(extent.half))
-    row_px = float(strip.line.s[1] - strip.line.s[0]) / unit
-    along = max(_ALONG_PX, _ALONG_WIDTHS * width_px) / row_px
-    smooth = smoothed(strip.opponent, 0, along)
-    sides = []
-    for side, edge in ((-1, extent.left), (1, extent.right)):
-        signal, distance = projection(smooth, strip.valid, edge, side, extent)
-        near = _sharpest(signal, edge, side, 3 + 0.06 * float(np.median(extent.half)))
-        places = locate_edges(signal, near, side)
-        sides.append(_toes(strip, places, extent, edge, side, distance))
-    return sides[0], sides[1]
+@dataclass(frozen=True, slots=True)
+class Rough:
+    """Coarse toes per row of a line: offsets in the plane's unit, and how bead-like the inside."""
+
+    left: Floats
+    right: Floats
+    present: Floats
+
+    @property
+    def half(self) -> float:
+        """Typical half width."""
+        return float(np.median(self.right - self.left)) / 2
 
 
-def projection(
-    opponent: Features, valid: NDArray[np.bool_], edge: Floats, side: int, extent: Extent
-) -> tuple[NDArray[np.float32], float]:
-    """The one colour mixture that tells bead from plate best at this toe, shape (rows, columns)."""
-    depth = max(4.0, 0.25 * float(np.median(extent.half)))
-    columns = opponent.shape[1]
-    inner = (edge - depth, edge - 1) if side > 0 else (edge + 1, edge + depth)
-    outer = (edge + 1, edge + depth) if side > 0 else (edge - depth, edge - 1)
-    inside, outside = (zone(columns, *bounds, valid) for bounds in (inner, outer))
-    direction, distance = fisher_direction(opponent[inside], opponent[outside])
-    return (opponent @ direction.astype(np.float32)), distance
+def refine_toes(
+    photo: Photo, plane: Plane, line: Centreline, rough: Rough, unit: float, every: int
+) -> tuple[Toes, Toes]:
+    """Sub-pixel toes of both sides at each `every`-th row of `line`; `unit` is a px's length."""
+    left = _Side(photo, plane, line, rough.left, -1, rough, unit).refined(every)
+    return left, _Side(photo, plane, line, rough.right, 1, rough, unit).refined(every)
 
 
-def _sharpest(signal: NDArray[np.float32], edge: Floats, side: int, reach: float) -> Floats:
-    """Chain of the steepest falls from bead to plate within `reach` columns of `edge`."""
-    smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.5)
-    fall = -side * np.gradient(smooth, axis=1)
-    away = side * (np.arange(signal.shape[1]) - edge[:, None])
-    typical = np.percentile(np.where(np.abs(away) <= reach, fall, 0).max(axis=1), 50) + 1e-6
-    score = np.clip(fall / typical, 0, 1.5) * (1 + 0.2 * away / reach)
-    score = np.where(np.abs(away) <= reach, score, -1e6).astype(np.float32)
-    return best_chain(score, 0.1).astype(np.float64)
+class _Side:
+    """One toe: its windows, the bead to the right, as the mixture of colours that tells most."""
+
+    def __init__(
+        self,
+        photo: Photo,
+        plane: Plane,
+        line: Centreline,
+        toe: Floats,
+        side: int,
+        rough: Rough,
+        unit: float,
+    ) -> None:
+        half_px, row_px = rough.half / unit, float(line.s[1] - line.s[0]) / unit
+        self._longest = max(_ALONG_PX, 2 * _ALONG_WIDTHS * half_px) / row_px
+        toe = gaussian_filter1d(toe, _CALM * self._longest, mode="nearest")
+        self._rough, self._toe, self._side, self._unit = rough, toe, side, unit
+        self._row_px = row_px
+        self._search = 3 + 0.06 * half_px
+        inside = max(3, min(_WINDOW_PX, int(0.8 * half_px)))
+        self._window = Window(_WINDOW_PX, inside)
+        self._reach = _WINDOW_PX + int(np.ceil(self._search)) + 3
+        columns = np.arange(-self._reach, self._reach + 1)
+        offsets = toe[:, None] - side * unit * columns
+        pixels, self._valid = sample_offsets(photo, plane, line, offsets)
+        depth = int(max(4, min(0.25 * half_px, self._reach)))
+        direction, self._distance = self._direction(along_rows(pixels, self._longest), depth)
+        self._signal: Signal = pixels @ direction.astype(np.float32)
+
+    def _direction(self, pixels: Signal, depth: int) -> tuple[Floats, float]:
+        inside = np.zeros(self._valid.shape, dtype=bool)
+        outside = inside.copy()
+        inside[:, self._reach + 1 : self._reach + depth] = True
+        outside[:, self._reach - depth + 1 : self._reach] = True
+        groups = [_samples(pixels, mask & self._valid) for mask in (inside, outside)]
+        if min(len(group) for group in groups) < _ENOUGH:
+            raise EvidenceError(
+                "the plate beside the bead is not in the photo, so its toe cannot be told; "
+                "take the photo with plate on both sides"
+            )
+        return fisher_direction(*groups)
+
+    def refined(self, every: int) -> Toes:
+        """The toe at each `every`-th row."""
+        pick = slice(every // 2, None, every)
+        signal = along_rows(self._signal, self._longest)[pick]
+        near = self._sharpest(signal)
+        model = self._model(signal, near)
+        share = self._averaging(pick, near, model)
+        if share < 1:
+            signal = along_rows(self._signal, share * self._longest)[pick]
+        places = locate_edges(signal, near, model)
+        smeared = self._smeared(places, share, every) if share < 1 else 0.0
+        return self._toes(places, smeared, share, pick)
+
+    def _smeared(self, places: EdgePlaces, share: float, every: int) -> float:
+        """Px of the toe's own waviness that blur and averaging take away, rms.
+
+        About what one more smoothing would take. Giving it back by deconvolution was tried: on
+        a textured plate it amplifies more noise than it restores.
+        """
+        sigma = np.hypot(places.blur_px / self._row_px, share * self._longest) / every
+        wave = places.column
+        return float(np.std(wave - gaussian_filter1d(wave, sigma, mode="nearest")))
+
+    def _sharpest(self, signal: Signal) -> Floats:
+        """Chain of the steepest rises from plate to bead near the coarse toe."""
+        smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.0)
+        rise = np.gradient(smooth, axis=1)
+        inward = np.abs(np.arange(signal.shape[1]) - self._reach)
+        near = inward <= self._search
+        typical = np.median(np.where(near, rise, 0).max(axis=1)) + 1e-6
+        score = np.where(near, np.clip(rise / typical, 0, 1.5), -1e6).astype(np.float32)
+        return best_chain(score, 0.1).astype(np.float64)
+
+    def _model(self, signal: Signal, near: Floats) -> EdgeModel:
+        every = max(1, len(near) // _TRIED_ROWS)
+        centre = np.rint(near[::every]).astype(np.int64)
+        return choose_model(signal[::every], centre, self._window)
+
+    def _averaging(self, pick: slice, near: Floats, model: EdgeModel) -> float:
+        """Part of the longest averaging with the least expected error (Stein's estimate)."""
+        every = max(1, len(near) // _TRIED_ROWS)
+        places, noise = [], 0.0
+        for share in _SHARES:
+            signal = along_rows(self._signal, share * self._longest)[pick][::every]
+            found = locate_edges(signal, near[::every], model)
+            places.append(found.column)
+            noise = float(np.median(found.u_noise)) ** 2
+        return _least_risk(np.array(places), np.array(_SHARES), noise)
+
+    def _toes(self, places: EdgePlaces, smeared: float, share: float, pick: slice) -> Toes:
+        column = places.column
+        rows = np.arange(len(column))
+        beyond = column - 3 - 2 * places.blur_px
+        outside = np.clip(np.rint(beyond).astype(int), 0, 2 * self._reach)
+        inward = column - self._reach
+        followed = along_rows(self._toe.astype(np.float32)[:, None], share * self._longest)[:, 0]
+        return Toes(
+            offset=followed[pick].astype(np.float64) - self._side * self._unit * inward,
+            u_noise=places.u_noise * self._unit,
+            u_model=np.sqrt(places.u_model**2 + smeared**2 + _RASTER_PX**2) * self._unit,
+            height=places.height,
+            in_frame=self._valid[pick][rows, outside],
+            present=self._rough.present[pick],
+            disagreement=np.abs(inward) * self._unit,
+            distance=self._distance,
+            model=places.model,
+            blur_px=places.soft_px,
+        )
 
 
-def _toes(
-    strip: Strip, places: EdgePlaces, extent: Extent, edge: Floats, side: int, distance: float
-) -> Toes:
-    column = places.column
-    rows = np.arange(len(column))
-    reach = 3 + 2 * places.blur_px
-    outside = np.clip(np.rint(column + side * reach).astype(int), 0, strip.valid.shape[1] - 1)
-    return Toes(
-        offset=strip.offset(column),
-        u_noise=places.u * strip.step,
-        u_model=places.between_models * strip.step,
-        height=places.height,
-        in_frame=strip.valid[rows, outside],
-        present=extent.present,
-        disagreement=np.abs(column - edge) * strip.step,
-        distance=distance,
-        model=places.model,
-        blur_px=places.blur_px,
+def along_rows(values: Signal, sigma: float) -> Signal:
+    """Gaussian average over rows."""
+    shape = values.shape
+    flat = np.ascontiguousarray(values.reshape(shape[0], -1))
+    size = 2 * int(3 * sigma + 0.5) + 1
+    kernel = cv2.getGaussianKernel(size, sigma).astype(np.float32)
+    done = cv2.sepFilter2D(
+        flat, cv2.CV_32F, np.ones(1, np.float32), kernel, borderType=cv2.BORDER_REPLICATE
     )
+    return np.asarray(done, dtype=np.float32).reshape(shape)
+
+
+def _samples(pixels: Signal, mask: NDArray[np.bool_]) -> Signal:
+    chosen = pixels[mask]
+    return chosen[:: max(1, len(chosen) // 20_000)]
+
+
+def _least_risk(places: Floats, shares: Floats, noise: float) -> float:
+    """The share of least risk; `places` (shares, rows), `noise` the variance at the last share."""
+    ratio, noise = shares[-1] / shares, max(noise, _SENSOR_PX**2)
+    covariance = np.sqrt(2) * shares[-1] / np.hypot(shares[-1], shares)
+    apart = (1.4826 * np.median(np.abs(places - places[-1]), axis=1)) ** 2
+    risk = apart - noise * (1 + ratio - 2 * covariance) + noise * ratio
+    return float(shares[int(np.argmax(risk <= 1.1 * risk.min()))])

@@ -1,13 +1,14 @@
 """The strip: one remap that undoes lens, perspective and the seam's curve at once."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from .curve import Centreline
-from .image import Photo
+from .image import Photo, opponent
 from .plane import Plane
 
 Floats = NDArray[np.float32]
@@ -41,27 +42,47 @@ def sample_strip(
 ) -> Strip:
     """Sample the photo along `line`, `reach` to both sides, every `step` across.
 
-    `blur` is the length of a step in photo px: above 1 the photo is blurred so that no detail
+    `blur` is the length of a step in photo px: above 1 the photo is averaged so that no detail
     falls between the samples.
     """
     count = int(np.ceil(reach / step))
     offsets = np.arange(-count, count + 1, dtype=np.float64) * step
+    opponent, valid = sample_offsets(photo, plane, line, offsets[None], blur)
+    return Strip(line, opponent, valid, offsets, step)
+
+
+def sample_offsets(
+    photo: Photo, plane: Plane, line: Centreline, offsets: NDArray[np.float64], blur: float = 1.0
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Opponent channels at `offsets` (rows or 1, columns) from `line`, and which are in the photo.
+
+    Shapes (rows, columns, channels) and (rows, columns); for `blur` see `sample_strip`.
+    """
     x, y = _maps(plane, line, offsets)
     valid = (x >= 0) & (x <= photo.width_px - 1) & (y >= 0) & (y <= photo.height_px - 1)
     left, right = _span(x, photo.width_px)
     top, bottom = _span(y, photo.height_px)
-    part = photo.opponent(slice(top, bottom), slice(left, right))
-    if blur > 1.3:
-        part = cv2.GaussianBlur(part, (0, 0), 0.4 * blur).reshape(part.shape)
+    part = photo.pixels[top:bottom, left:right]
+    factor = min(max(1, int(blur)), *part.shape[:2])
+    if factor > 1:
+        part = _averaged(part, factor)
+    if blur / factor > 1.3:
+        part = cv2.GaussianBlur(part, (0, 0), 0.4 * blur / factor)
     sampled = cv2.remap(
         part,
-        (x - left).astype(np.float32),
-        (y - top).astype(np.float32),
+        ((x - left + 0.5) / factor - 0.5).astype(np.float32),
+        ((y - top + 0.5) / factor - 0.5).astype(np.float32),
         cv2.INTER_CUBIC,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    opponent = np.asarray(sampled, dtype=np.float32).reshape(*x.shape, -1)
-    return Strip(line, opponent, valid, offsets, step)
+    return opponent(sampled).reshape(*x.shape, -1), valid
+
+
+def _averaged(pixels: NDArray[Any], factor: int) -> NDArray[Any]:
+    """Means of whole blocks of factor x factor pixels; what is over at the far borders goes."""
+    rows, columns = (size // factor for size in pixels.shape[:2])
+    whole = pixels[: rows * factor, : columns * factor]
+    return cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA)
 
 
 def _span(values: NDArray[np.float64], size: int) -> tuple[int, int]:

@@ -11,13 +11,13 @@ from seamlog.errors import EvidenceError, ImageError
 from .band import BandSearch
 from .confidence import SOFT_PX
 from .core import band_inside, softness
-from .curve import arc_length, fit_centreline
+from .curve import Centreline, arc_length, fit_centreline
 from .features import Features, smoothed, stack_texture, strip_features
 from .image import Photo
 from .measurement import BeadMeasurement
 from .path import find_paths
 from .plane import Plane, Points
-from .refine import refine_toes
+from .refine import Rough, refine_toes
 from .sampling import Strip, sample_strip
 from .toes import Extent, find_toes
 from .width import BandEvidence, Toes, assemble
@@ -44,10 +44,10 @@ class _Path:
 
 @dataclass(frozen=True, slots=True)
 class _Traced:
-    """Both toes in the strip at the photo's own resolution."""
+    """Both toes at stations of a line through the bead's middle."""
 
-    strip: Strip
-    extent: Extent
+    line: Centreline
+    half: float
     toes: tuple[Toes, Toes]
 
 
@@ -91,8 +91,7 @@ def _measure(photo: Photo, plane: Plane, found: _Path, start: str | None) -> Bea
     unit = plane.unit_per_px(plane.to_px(found.points))
     traced = _traced(photo, plane, found.points, found.half, unit)
     band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit))
-    rows_per_station = _row_step(plane, unit)[0]
-    return assemble(photo, plane, traced.strip, traced.toes, rows_per_station, band, start)
+    return assemble(photo, plane, traced.line, traced.toes, unit, band, start)
 
 
 def _traced(photo: Photo, plane: Plane, points: Points, half: float, unit: float) -> _Traced:
@@ -104,29 +103,30 @@ def _traced(photo: Photo, plane: Plane, points: Points, half: float, unit: float
         half = float(np.median(extent.half)) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
         strip, extent = _straighten(photo, plane, path, half, unit, freedom)
-    fine = _sampled(photo, plane, path, half, unit, _row_step(plane, unit)[1], unit)
-    fine_extent = _carried(strip, extent, fine)
-    return _Traced(fine, fine_extent, refine_toes(fine, fine_extent, unit))
+    every, along = _row_step(plane, unit)
+    line = fit_centreline(path, along, max(8.0 * half, 16 * unit))
+    rough = _carried(strip, extent, line)
+    toes = refine_toes(photo, plane, line, rough, unit, every)
+    return _Traced(line.every(every), rough.half, toes)
 
 
 def _sharper_inside(photo: Photo, plane: Plane, traced: _Traced, unit: float) -> float:
     """How many times sharper a band inside is than the toes, each at its weaker side."""
     if min(toe.blur_px for toe in traced.toes) <= SOFT_PX:
         return 0.0
-    strip, extent = traced.strip, traced.extent
-    rows = np.arange(len(strip.line.s))[extent.present > 0]
+    rows = np.flatnonzero(traced.toes[0].present > 0)
     if len(rows) < _COARSE:
         return 0.0
-    middle = strip.line.shifted((traced.toes[0].offset + traced.toes[1].offset) / 2)[rows]
-    found = band_inside(photo, plane, middle, float(np.median(extent.half)) * strip.step, unit)
+    middle = traced.line.shifted((traced.toes[0].offset + traced.toes[1].offset) / 2)[rows]
+    found = band_inside(photo, plane, middle, traced.half, unit)
     if found is None:
         return 0.0
     try:
         inner = _traced(photo, plane, *found, unit)
     except (EvidenceError, ImageError):
         return 0.0
-    inside = max(softness(inner.strip, inner.extent, inner.toes))
-    return min(softness(strip, extent, traced.toes)) / max(inside, 1.0)
+    inside = max(softness(photo, plane, inner.line, inner.toes, unit))
+    return min(softness(photo, plane, traced.line, traced.toes, unit)) / max(inside, 1.0)
 
 
 def _extended(photo: Photo, plane: Plane, path: Points, half: float) -> Points:
@@ -257,14 +257,14 @@ def _sampled(
     return sample_strip(photo, plane, line, 2.4 * half + 8 * across, across, blur=across / unit)
 
 
-def _carried(coarse: Strip, extent: Extent, fine: Strip) -> Extent:
-    """The extent found in one strip as columns and rows of another along the same path."""
+def _carried(strip: Strip, extent: Extent, line: Centreline) -> Rough:
+    """The extent found in a strip as offsets at the rows of another line along the same path."""
 
     def carried(values: Floats) -> Floats:
-        return np.interp(fine.line.s, coarse.line.s, values)
+        return np.interp(line.s, strip.line.s, values)
 
-    left, right = (fine.column(carried(coarse.offset(e))) for e in (extent.left, extent.right))
-    return Extent(left, right, carried(extent.present))
+    left, right = (carried(strip.offset(edge)) for edge in (extent.left, extent.right))
+    return Rough(left, right, carried(extent.present))
 
 
 def _calmed(extent: Extent) -> Extent:

@@ -9,10 +9,10 @@ from scipy.ndimage import median_filter
 from seamlog.errors import EvidenceError
 
 from .confidence import Doubt, Evidence, doubts, serious
+from .curve import Centreline
 from .image import Photo
 from .measurement import END, TRUSTED, BeadMeasurement
 from .plane import Plane, Points
-from .sampling import Strip
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class BandEvidence:
 
 @dataclass(frozen=True, slots=True)
 class Toes:
-    """One side's toes, a value per strip row: offset and its uncertainties in the plane's unit.
+    """One side's toes, a value per station: offset and its uncertainties in the plane's unit.
 
     `height` is the step from plate to bead (grey levels), `in_frame` whether the plate beyond is
     in the photo, `present` how much the inside looks like bead, `disagreement` the distance
@@ -58,25 +58,28 @@ class Toes:
 def assemble(
     photo: Photo,
     plane: Plane,
-    strip: Strip,
+    line: Centreline,
     toes: tuple[Toes, Toes],
-    rows_per_station: int,
+    unit: float,
     band: BandEvidence,
     start: str | None,
 ) -> BeadMeasurement:
-    """Stations out of strip rows; `EvidenceError` when the evidence carries no width at all."""
+    """Stations, one per row of `line`; `EvidenceError` when the evidence carries no width at all.
+
+    `unit` is the length of a photo px.
+    """
     left, right = toes
     width = right.offset - left.offset
     typical = float(np.median(width))
-    reasons = _reasons(left, right, width, typical, strip)
-    left_px, right_px, centre_px = _points(plane, strip, left, right)
+    reasons = _reasons(left, right, width, typical, line)
+    left_px, right_px, centre_px = _points(plane, line, left, right)
     bead = _bead_rows(left.present)
-    round_ends = _ends(photo, centre_px, bead, typical, strip)
+    round_ends = _ends(photo, centre_px, bead, typical, line, unit)
     reasons[round_ends & (reasons == "")] = END
     flagged = reasons != ""
-    ends = [_at_frame(photo, centre_px[end], typical / strip.step) for end in _ends_of(bead)]
-    length = np.inf if all(ends) else float(np.ptp(strip.line.s[bead]))
-    found = doubts(_evidence(toes, flagged[bead], typical, band, strip.step, length))
+    ends = [_at_frame(photo, centre_px[end], typical / unit) for end in _ends_of(bead)]
+    length = np.inf if all(ends) else float(np.ptp(line.s[bead]))
+    found = doubts(_evidence(toes, flagged[bead], typical, band, unit, length))
     confidence = found[0].confidence
     if confidence < _REFUSED:
         raise EvidenceError(
@@ -84,30 +87,29 @@ def assemble(
             f"{confidence:.2f}): {found[0].sentence}; take a sharper photo with even light, "
             "from above"
         )
-    pick = slice(bead.start + rows_per_station // 2, bead.stop, rows_per_station)
     u_noise = np.hypot(left.u_noise, right.u_noise)
     backwards, starts_at = _direction(centre_px, start)
     order = slice(None, None, -1) if backwards else slice(None)
     sides = (right_px, left_px) if backwards else (left_px, right_px)
-    s = strip.line.s[pick]
+    s = line.s[bead]
     return BeadMeasurement(
         unit=plane.unit,
         s=(s[-1] - s[::-1] if backwards else s - s[0]),
-        width=np.where(width > 0, width, np.nan)[pick][order],
-        u_width=_u_width(left, right, u_noise, width, plane)[pick][order],
-        u_noise=u_noise[pick][order],
-        left_px=sides[0][pick][order],
-        right_px=sides[1][pick][order],
-        centre_px=centre_px[pick][order],
-        flagged=flagged[pick][order],
-        reason=tuple(str(reason) for reason in reasons[pick][order]),
-        unit_per_px=strip.step,
+        width=np.where(width > 0, width, np.nan)[bead][order],
+        u_width=_u_width(left, right, u_noise, width, plane)[bead][order],
+        u_noise=u_noise[bead][order],
+        left_px=sides[0][bead][order],
+        right_px=sides[1][bead][order],
+        centre_px=centre_px[bead][order],
+        flagged=flagged[bead][order],
+        reason=tuple(str(reason) for reason in reasons[bead][order]),
+        unit_per_px=unit,
         confidence=confidence,
         warnings=_warnings(plane, found),
         starts_at=starts_at,
         direction_known=start is not None,
-        open_start=_at_frame(photo, centre_px[pick][order][0], typical / strip.step),
-        open_stop=_at_frame(photo, centre_px[pick][order][-1], typical / strip.step),
+        open_start=_at_frame(photo, centre_px[bead][order][0], typical / unit),
+        open_stop=_at_frame(photo, centre_px[bead][order][-1], typical / unit),
     )
 
 
@@ -127,25 +129,25 @@ def _ends_of(bead: slice) -> tuple[int, int]:
 
 
 def _ends(
-    photo: Photo, centre_px: Points, bead: slice, typical: float, strip: Strip
+    photo: Photo, centre_px: Points, bead: slice, typical: float, line: Centreline, unit: float
 ) -> NDArray[np.bool_]:
     """Rows within half a width of a start or stop in the photo, where the bead is round."""
     rows = np.arange(len(centre_px))
-    reach = _ROUND_END * typical / float(strip.line.s[1] - strip.line.s[0])
+    reach = _ROUND_END * typical / float(line.s[1] - line.s[0])
     ends = np.zeros(len(rows), dtype=bool)
     for end in _ends_of(bead):
-        if not _at_frame(photo, centre_px[end], typical / strip.step):
+        if not _at_frame(photo, centre_px[end], typical / unit):
             ends |= np.abs(rows - end) < reach
     return ends
 
 
 def _reasons(
-    left: Toes, right: Toes, width: Floats, typical: float, strip: Strip
+    left: Toes, right: Toes, width: Floats, typical: float, line: Centreline
 ) -> NDArray[np.str_]:
     """Why a row is not to be trusted, or ''."""
     reasons = np.full(len(width), "", dtype="U40")
     for name, toe in (("left", left), ("right", right)):
-        reasons[_strays(toe.offset, typical, strip)] = f"{name} toe strays"
+        reasons[_strays(toe.offset, typical, line)] = f"{name} toe strays"
         reasons[toe.u_noise > _FAINT * typical] = f"{name} toe too faint"
         reasons[toe.height < 0.15 * np.median(toe.height)] = f"{name} toe not told from the plate"
         reasons[~toe.in_frame] = f"{name} toe at the frame of the photo"
@@ -154,8 +156,8 @@ def _reasons(
     return reasons
 
 
-def _strays(offset: Floats, typical: float, strip: Strip) -> NDArray[np.bool_]:
-    step = float(strip.line.s[1] - strip.line.s[0])
+def _strays(offset: Floats, typical: float, line: Centreline) -> NDArray[np.bool_]:
+    step = float(line.s[1] - line.s[0])
     size = 2 * int(max(3, 0.5 * typical / step) // 2) + 1
     away = offset - median_filter(offset, size, mode="nearest")
     spread = 1.4826 * float(np.median(np.abs(away)))
@@ -204,11 +206,11 @@ def _warnings(plane: Plane, found: list[Doubt]) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-def _points(plane: Plane, strip: Strip, left: Toes, right: Toes) -> tuple[Points, Points, Points]:
+def _points(
+    plane: Plane, line: Centreline, left: Toes, right: Toes
+) -> tuple[Points, Points, Points]:
     middle = (left.offset + right.offset) / 2
-    a, b, c = (
-        plane.to_px(strip.line.shifted(offset)) for offset in (left.offset, right.offset, middle)
-    )
+    a, b, c = (plane.to_px(line.shifted(offset)) for offset in (left.offset, right.offset, middle))
     return a, b, c
 
 
@@ -225,6 +227,6 @@ def _direction(centre_px: Points, start: str | None) -> tuple[bool, str]:
 
 def _at_frame(photo: Photo, point: Points, width_px: float) -> bool:
     x, y = point
-    margin = max(6.0, 0.15 * width_px)
+    margin = max(6.0, 0.25 * width_px)
     nearest = min(x, y, photo.width_px - 1 - x, photo.height_px - 1 - y)
     return bool(nearest < margin)
