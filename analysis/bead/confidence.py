@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SOFT_PX = 2.0
-"""Blur of a toe from which on it may be the fading end of something rather than a toe."""
+
+def soft_px(width_px: float) -> float:
+    """Blur of a toe from which on it may be the fading end of something rather than a toe."""
+    return max(2.0, 0.015 * width_px)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
     """All doubts, the worst first; the confidence of a width is that of its worst doubt."""
     e = evidence
     inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
-    tinted = inside * np.clip((e.blur_px - SOFT_PX) / 2.0, 0, 1)
+    tinted = inside * np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),
@@ -60,7 +62,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
         (e.step_grey / 8, f"a toe's step is {e.step_grey:.1f} grey levels only"),
         (e.lengths / 10, f"it is {e.lengths:.1f} times as long as wide: a bead is longer"),
         (0.45 if e.nested else 1.0, "it lies inside a broader band that is as evident"),
-        (1 - 0.8 * tinted, "its edges are soft and a narrower band lies inside: a heat tint?"),
+        (1 - 0.75 * tinted, "its edges are soft and a narrower band lies inside: a heat tint?"),
     ]
     judged = [Doubt(float(np.clip(value, 0, 1)), sentence) for value, sentence in found]
     return sorted(judged, key=lambda doubt: doubt.confidence)

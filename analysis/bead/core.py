@@ -4,7 +4,6 @@ Something sharp inside shows that the photo is in focus, so toes that are soft i
 truth: the fading end of a heat tint rather than the toes of a bead.
 """
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +12,7 @@ from .curve import Centreline, fit_centreline
 from .features import smoothed, strip_features
 from .image import Photo
 from .plane import Plane, Points
-from .refine import along_rows
+from .refine import averaged_at, columns_of_change
 from .sampling import sample_offsets, sample_strip
 from .width import Toes
 from .zones import fisher_direction
@@ -68,18 +67,10 @@ def softness(
         columns = np.arange(-reach, reach + 1)
         offsets = toe.offset[:, None] - side * unit * columns
         pixels, valid = sample_offsets(photo, plane, line, offsets)
-        smooth = along_rows(pixels, 2.0)
+        smooth = averaged_at(pixels, np.arange(len(pixels)), 2.0)
         inside, outside = (
             smooth[:, part][valid[:, part]] for part in (slice(reach + 1, None), slice(0, reach))
         )
         direction = fisher_direction(inside, outside)[0].astype(np.float32)
-        sides.append(_columns_of_change(smooth @ direction, reach))
+        sides.append(columns_of_change(smooth @ direction))
     return sides[0], sides[1]
-
-
-def _columns_of_change(profile: NDArray[np.float32], reach: int) -> float:
-    calm = cv2.GaussianBlur(profile, (0, 0), sigmaX=1.0, sigmaY=0.01)
-    level = max(2, reach // 4)
-    change = np.abs(calm[:, :level].mean(axis=1) - calm[:, -level:].mean(axis=1))
-    steepest = np.abs(np.gradient(calm, axis=1)).max(axis=1)
-    return float(np.median(change / np.maximum(steepest, 1e-3)))

@@ -6,7 +6,7 @@ chosen, and they are fitted, on means over stretches of the toe. Taken off, they
 step to each row, which is the least noisy thing to place.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -75,8 +75,7 @@ class Window:
 class EdgePlaces:
     """Per row: column of the edge, its random standard uncertainty, that of the model, the step.
 
-    `model` says what lies beside the step, `blur_px` how blurred the edge is, `soft_px` how
-    blurred it would be at most, shading taken for blur.
+    `model` says what lies beside the step, `blur_px` how blurred the edge is.
     """
 
     column: Floats
@@ -85,7 +84,6 @@ class EdgePlaces:
     height: Floats
     model: str
     blur_px: float
-    soft_px: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +96,6 @@ class EdgeModel:
     window: Window
     name: str
     blur: float
-    soft_blur: float
     u: float
     shading: Floats
 
@@ -131,8 +128,7 @@ def choose_model(
     near = window.around(model.blur)
     if model.name == "step" or near == window:
         return model
-    narrow = _chosen(profiles_at(signal, centre, near), near)
-    return replace(narrow, soft_blur=max(model.soft_blur, narrow.blur))
+    return _chosen(profiles_at(signal, centre, near), near)
 
 
 def _chosen(profiles: Floats, window: Window) -> EdgeModel:
@@ -144,13 +140,14 @@ def _chosen(profiles: Floats, window: Window) -> EdgeModel:
     }
     name = min(scores, key=lambda model: scores[model])
     weights = np.array([np.exp((scores[name] - score) / _PRICE) for score in scores.values()])
-    places = np.array([float(np.median(fitted.shift)) for _, _, fitted in found.values()])
-    away = places - float(np.median(found[name][2].shift))
+    places = np.array([float(np.median(shift)) for _, _, shift in found.values()])
+    away = places - float(np.median(found[name][2]))
     doubt = float(np.sqrt((weights * away**2).sum() / weights.sum()))
     u = float(np.hypot(doubt, _TRUST * away[list(_MODELS).index("step")]))
-    _, blur, fitted = found[name]
-    shading = _shading(means, window, name, blur, fitted.shift)
-    return EdgeModel(window, name, blur, max(blur, found["step"][1]), u, shading)
+    blur = found[name][1]
+    shift = fit(means, window, name, blur, 1.5).shift
+    shading = _shading(means, window, name, blur, shift)
+    return EdgeModel(window, name, blur, u, shading)
 
 
 def _shading(means: Floats, window: Window, model: str, blur: float, shift: Floats) -> Floats:
@@ -176,23 +173,23 @@ def _aligned_means(profiles: Floats, shift: Floats) -> Floats:
     return np.array([moved[block].mean(axis=0) for block in blocks])
 
 
-def _best_blur(means: Floats, window: Window, model: str) -> tuple[float, float, Fit]:
-    """Log misfit at the best blur, that blur, and the fit."""
-
-    def tried(blur: float) -> tuple[float, Fit]:
-        fitted = fit(means, window, model, blur, 1.5)
-        freedom = float((window.weight**2).sum()) - _parameters(model) - 1
-        return float(np.log(np.median(fitted.misfit) / max(freedom, 1) + floor)), fitted
-
+def _best_blur(means: Floats, window: Window, model: str) -> tuple[float, float, Floats]:
+    """Log misfit at the best blur, that blur, and the shifts of the rows there."""
+    shifts, bases = _subspaces(window, model, _BLURS_PX, 1.5)
+    weighted = (means - means.mean(axis=1, keepdims=True)) * window.weight
+    shape = (len(means), len(_BLURS_PX), len(shifts), -1)
+    captured = ((weighted @ bases) ** 2).reshape(shape).sum(axis=3)
+    best = captured.max(axis=2)
+    freedom = max(float((window.weight**2).sum()) - _parameters(model) - 1, 1.0)
+    misfit = np.median((weighted**2).sum(axis=1)[:, None] - best, axis=0) / freedom
     floor = _GREY_FLOOR + (_EDGE_FLOOR * float(np.median(np.ptp(means, axis=1)))) ** 2
-
-    logs = [tried(blur)[0] for blur in _BLURS_PX]
+    logs = np.log(np.maximum(misfit, 0) + floor)
     at = int(np.clip(np.argmin(logs), 1, len(logs) - 2))
     a, b, c = logs[at - 1 : at + 2]
     move = float(np.clip(0.5 * (a - c) / max(a - 2 * b + c, 1e-9), -1, 1))
     blur = round(float(_BLURS_PX[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move), 2)
-    score, fitted = tried(blur)
-    return score, blur, fitted
+    nearest = int(np.argmin(logs))
+    return float(b - 0.25 * (a - c) * move), blur, shifts[captured[:, nearest].argmax(axis=1)]
 
 
 def _parameters(model: str) -> int:
@@ -202,7 +199,7 @@ def _parameters(model: str) -> int:
 
 def fit(profiles: Floats, window: Window, model: str, blur: float, reach: float) -> Fit:
     """The best shift of each profile within `reach` columns, by captured energy."""
-    shifts, bases = _subspaces(window, model, blur, reach)
+    shifts, bases = _subspaces(window, model, (blur,), reach)
     weighted = (profiles - profiles.mean(axis=1, keepdims=True)) * window.weight
     projected = weighted @ bases
     captured = (projected**2).reshape(len(profiles), len(shifts), -1).sum(axis=2)
@@ -215,10 +212,17 @@ def fit(profiles: Floats, window: Window, model: str, blur: float, reach: float)
 
 
 @cache
-def _subspaces(window: Window, model: str, blur: float, reach: float) -> tuple[Floats, Floats]:
-    """Shifts, and the orthonormal bases of the weighted profiles side by side, (window, n k)."""
+def _subspaces(
+    window: Window, model: str, blurs: tuple[float, ...], reach: float
+) -> tuple[Floats, Floats]:
+    """Shifts, and orthonormal bases of the weighted profiles side by side.
+
+    Shape (window, blurs x shifts x k), the last index fastest.
+    """
     shifts = np.arange(-reach, reach + 1e-9, _STEP)
-    stacked = np.stack([_basis(window.columns - shift, model, blur) for shift in shifts])
+    stacked = np.stack(
+        [_basis(window.columns - shift, model, blur) for blur in blurs for shift in shifts]
+    )
     bases = np.linalg.qr(stacked * window.weight[None, :, None])[0]
     return shifts, np.ascontiguousarray(bases.transpose(1, 0, 2).reshape(len(window.weight), -1))
 
@@ -240,6 +244,18 @@ def _basis(z: Floats, model: str, blur: float) -> Floats:
     return np.array(parts).T
 
 
+def typical_blur(profiles: Floats, window: Window) -> float:
+    """Blur that fits single rows best: where a toe is ragged, their mean is softer than they."""
+    scores = []
+    for model in ("step", "line", "ramps", "ramps, line"):
+        for blur in _BLURS_PX:
+            misfit = float(np.median(fit(profiles, window, model, blur, 2.5).misfit))
+            freedom = float((window.weight**2).sum()) - _parameters(model) - 1
+            score = float(np.log(misfit / max(freedom, 1) + _GREY_FLOOR))
+            scores.append((score + _PRICE * (_parameters(model) - 2), blur))
+    return min(scores)[1]
+
+
 def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) -> EdgePlaces:
     """Refine edges of `signal` (rows, columns; bead to the right) within two columns of `near`."""
     centre = np.rint(near).astype(np.int64)
@@ -248,9 +264,7 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     u_noise = _random_u(profiles, plain, model)
     height = _height(profiles, plain.shift, model.window, model.blur)
     u_model = np.full(len(near), model.u)
-    return EdgePlaces(
-        centre + plain.shift, u_noise, u_model, height, model.name, model.blur, model.soft_blur
-    )
+    return EdgePlaces(centre + plain.shift, u_noise, u_model, height, model.name, model.blur)
 
 
 def plain_profiles(

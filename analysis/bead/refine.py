@@ -17,6 +17,8 @@ from .edge_model import (
     Window,
     choose_model,
     locate_edges,
+    profiles_at,
+    typical_blur,
 )
 from .image import Photo
 from .plane import Plane
@@ -26,6 +28,7 @@ from .zones import fisher_direction
 
 Floats = NDArray[np.float64]
 Signal = NDArray[np.float32]
+Rows = NDArray[np.int64]
 
 _ALONG_PX = 4.0
 _ALONG_WIDTHS = 0.03
@@ -39,8 +42,10 @@ _WINDOW_PX = 18
 _TRIED_ROWS = 160
 _SENSOR_PX = 0.04
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
-_RASTER_PX = 0.02
-"""What is left of it, and of the unknown shape of the blur, at the longest: standard uncertainty."""
+_RASTER_PX = 0.03
+"""Standard uncertainty that the raster and the unknown shape of the blur leave at the longest."""
+_SHARP_PX = 2.0
+"""Blur up to which a toe is not looked at twice."""
 _ENOUGH = 64
 
 
@@ -92,15 +97,16 @@ class _Side:
         offsets = toe[:, None] - side * unit * columns
         pixels, self._valid = sample_offsets(photo, plane, line, offsets)
         depth = int(max(4, min(0.25 * half_px, self._reach)))
-        direction, self._distance = self._direction(along_rows(pixels, self._longest), depth)
+        direction, self._distance = self._direction(pixels, depth)
         self._signal: Signal = pixels @ direction.astype(np.float32)
 
     def _direction(self, pixels: Signal, depth: int) -> tuple[Floats, float]:
-        inside = np.zeros(self._valid.shape, dtype=bool)
-        outside = inside.copy()
-        inside[:, self._reach + 1 : self._reach + depth] = True
-        outside[:, self._reach - depth + 1 : self._reach] = True
-        groups = [_samples(pixels, mask & self._valid) for mask in (inside, outside)]
+        rows = np.linspace(0, len(pixels) - 1, min(len(pixels), 2 * _TRIED_ROWS)).astype(np.int64)
+        smooth, valid = averaged_at(pixels, rows, self._longest), self._valid[rows]
+        groups = []
+        for first in (self._reach + 1, self._reach - depth + 1):
+            part = slice(first, first + depth - 1)
+            groups.append(smooth[:, part][valid[:, part]])
         if min(len(group) for group in groups) < _ENOUGH:
             raise EvidenceError(
                 "the plate beside the bead is not in the photo, so its toe cannot be told; "
@@ -110,16 +116,24 @@ class _Side:
 
     def refined(self, every: int) -> Toes:
         """The toe at each `every`-th row."""
-        pick = slice(every // 2, None, every)
-        signal = along_rows(self._signal, self._longest)[pick]
+        pick = np.arange(every // 2, len(self._toe), every)
+        signal = averaged_at(self._signal, pick, self._longest)
         near = self._sharpest(signal)
         model = self._model(signal, near)
         share = self._averaging(pick, near, model)
         if share < 1:
-            signal = along_rows(self._signal, share * self._longest)[pick]
+            signal = averaged_at(self._signal, pick, share * self._longest)
         places = locate_edges(signal, near, model)
         smeared = self._smeared(places, share, every) if share < 1 else 0.0
-        return self._toes(places, smeared, share, pick)
+        return self._toes(places, smeared, share, pick, self._softness(signal, near, model))
+
+    def _softness(self, signal: Signal, near: Floats, model: EdgeModel) -> float:
+        """Blur of the toe; that of single rows where their mean is soft, for a toe is ragged."""
+        if model.blur <= _SHARP_PX:
+            return model.blur
+        every = max(1, len(near) // _TRIED_ROWS)
+        centre = np.rint(near[::every]).astype(np.int64)
+        return typical_blur(profiles_at(signal[::every], centre, self._window), self._window)
 
     def _smeared(self, places: EdgePlaces, share: float, every: int) -> float:
         """Px of the toe's own waviness that blur and averaging take away, rms.
@@ -146,26 +160,29 @@ class _Side:
         centre = np.rint(near[::every]).astype(np.int64)
         return choose_model(signal[::every], centre, self._window)
 
-    def _averaging(self, pick: slice, near: Floats, model: EdgeModel) -> float:
+    def _averaging(self, pick: Rows, near: Floats, model: EdgeModel) -> float:
         """Part of the longest averaging with the least expected error (Stein's estimate)."""
         every = max(1, len(near) // _TRIED_ROWS)
         places, noise = [], 0.0
         for share in _SHARES:
-            signal = along_rows(self._signal, share * self._longest)[pick][::every]
+            signal = averaged_at(self._signal, pick[::every], share * self._longest)
             found = locate_edges(signal, near[::every], model)
             places.append(found.column)
             noise = float(np.median(found.u_noise)) ** 2
         return _least_risk(np.array(places), np.array(_SHARES), noise)
 
-    def _toes(self, places: EdgePlaces, smeared: float, share: float, pick: slice) -> Toes:
+    def _toes(
+        self, places: EdgePlaces, smeared: float, share: float, pick: Rows, soft_px: float
+    ) -> Toes:
         column = places.column
         rows = np.arange(len(column))
         beyond = column - 3 - 2 * places.blur_px
         outside = np.clip(np.rint(beyond).astype(int), 0, 2 * self._reach)
         inward = column - self._reach
-        followed = along_rows(self._toe.astype(np.float32)[:, None], share * self._longest)[:, 0]
+        toe = self._toe.astype(np.float32)[:, None]
+        followed = averaged_at(toe, pick, share * self._longest)[:, 0]
         return Toes(
-            offset=followed[pick].astype(np.float64) - self._side * self._unit * inward,
+            offset=followed.astype(np.float64) - self._side * self._unit * inward,
             u_noise=places.u_noise * self._unit,
             u_model=np.sqrt(places.u_model**2 + smeared**2 + _RASTER_PX**2) * self._unit,
             height=places.height,
@@ -174,25 +191,32 @@ class _Side:
             disagreement=np.abs(inward) * self._unit,
             distance=self._distance,
             model=places.model,
-            blur_px=places.soft_px,
+            blur_px=soft_px,
         )
 
 
-def along_rows(values: Signal, sigma: float) -> Signal:
-    """Gaussian average over rows."""
-    shape = values.shape
-    flat = np.ascontiguousarray(values.reshape(shape[0], -1))
-    size = 2 * int(3 * sigma + 0.5) + 1
-    kernel = cv2.getGaussianKernel(size, sigma).astype(np.float32)
-    done = cv2.sepFilter2D(
-        flat, cv2.CV_32F, np.ones(1, np.float32), kernel, borderType=cv2.BORDER_REPLICATE
-    )
-    return np.asarray(done, dtype=np.float32).reshape(shape)
+def averaged_at(values: Signal, rows: Rows, sigma: float) -> Signal:
+    """Gaussian averages over rows, at some rows only."""
+    half = int(3 * sigma + 0.5)
+    taps = np.arange(-half, half + 1)
+    kernel = np.exp(-0.5 * (taps / sigma) ** 2)
+    kernel = (kernel / kernel.sum()).astype(np.float32)
+    total = np.zeros((len(rows), *values.shape[1:]), dtype=np.float32)
+    for tap, part in zip(taps, kernel, strict=True):
+        total += part * values[np.clip(rows + tap, 0, len(values) - 1)]
+    return total
 
 
-def _samples(pixels: Signal, mask: NDArray[np.bool_]) -> Signal:
-    chosen = pixels[mask]
-    return chosen[:: max(1, len(chosen) // 20_000)]
+def columns_of_change(profiles: Signal) -> float:
+    """Columns that the change over profiles (rows, columns) takes at its steepest, the median.
+
+    A step with a blur of sigma takes sqrt(2 pi) sigma.
+    """
+    calm = cv2.GaussianBlur(profiles, (0, 0), sigmaX=1.0, sigmaY=0.01)
+    level = max(2, profiles.shape[1] // 8)
+    change = np.abs(calm[:, :level].mean(axis=1) - calm[:, -level:].mean(axis=1))
+    steepest = np.abs(np.gradient(calm, axis=1)).max(axis=1)
+    return float(np.median(change / np.maximum(steepest, 1e-3)))
 
 
 def _least_risk(places: Floats, shares: Floats, noise: float) -> float:

@@ -95,7 +95,8 @@ def _maps(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Photo coordinates of all samples: numerators and denominator are linear in the offset."""
     matrix = plane.px_from_plane()
-    base = line.points @ matrix[:, :2].T + matrix[:, 2]
-    slope = line.normals @ matrix[:, :2].T
-    x, y, w = (base[:, k, None] + slope[:, k, None] * offsets for k in range(3))
+    base = (line.points @ matrix[:, :2].T + matrix[:, 2]).astype(np.float32)
+    slope = (line.normals @ matrix[:, :2].T).astype(np.float32)
+    across = offsets.astype(np.float32)
+    x, y, w = (base[:, k, None] + slope[:, k, None] * across for k in range(3))
     return plane.through_lens(x / w, y / w)

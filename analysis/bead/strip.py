@@ -1,6 +1,6 @@
 """The strip method: straighten the bead, find its toes, recentre, repeat, refine below a pixel."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from seamlog.errors import EvidenceError, ImageError
 
 from .band import BandSearch
-from .confidence import SOFT_PX
+from .confidence import soft_px
 from .core import band_inside, softness
 from .curve import Centreline, arc_length, fit_centreline
-from .features import Features, smoothed, stack_texture, strip_features
+from .features import smoothed, stack_texture, strip_features
 from .image import Photo
 from .measurement import BeadMeasurement
 from .path import find_paths
@@ -24,13 +24,15 @@ from .width import BandEvidence, Toes, assemble
 
 Floats = NDArray[np.float64]
 
+
 STATION_MM = 0.25
 STATION_PX = 2.0
 NARROWEST_PX = 8.0
 _CLEAR = 0.5
 """Confidence from which on no other candidate is tried."""
 _COARSE = 40
-"""Columns of half the bead in the strip that toes are traced in."""
+_SECTIONS = 48
+"""Sections in which the band along a given path is looked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +45,23 @@ class _Path:
 
 
 @dataclass(frozen=True, slots=True)
+class _Grid:
+    """Columns of half the bead in a strip that toes are traced in, and its row : column step."""
+
+    columns: int
+    stretch: int
+
+
+@dataclass(frozen=True, slots=True)
 class _Traced:
     """Both toes at stations of a line through the bead's middle."""
 
     line: Centreline
     half: float
     toes: tuple[Toes, Toes]
+
+
+_Tracer = Callable[[Photo, Plane, Points, float, float], _Traced]
 
 
 def measure_strip(
@@ -61,7 +74,7 @@ def measure_strip(
     than 8 px.
     """
     if prior is not None:
-        return _measure(photo, plane, _given_path(photo, plane, prior), start)
+        return _measure(photo, plane, _given_path(photo, plane, prior), start, _along_given)
     return _most_trusted(photo, plane, _found_paths(photo, plane), start)
 
 
@@ -87,32 +100,51 @@ def _most_trusted(
     return best
 
 
-def _measure(photo: Photo, plane: Plane, found: _Path, start: str | None) -> BeadMeasurement:
+def _measure(
+    photo: Photo, plane: Plane, found: _Path, start: str | None, trace: _Tracer | None = None
+) -> BeadMeasurement:
     unit = plane.unit_per_px(plane.to_px(found.points))
-    traced = _traced(photo, plane, found.points, found.half, unit)
+    traced = (trace or _traced)(photo, plane, found.points, found.half, unit)
     band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit))
     return assemble(photo, plane, traced.line, traced.toes, unit, band, start)
 
 
 def _traced(photo: Photo, plane: Plane, points: Points, half: float, unit: float) -> _Traced:
+    """Along a path found in the photo: coarse, so its toes are traced and recentred repeatedly."""
     _refuse_narrow(photo, 2 * half / unit)
     path = _extended(photo, plane, points, half)
-    strip, extent = _straighten(photo, plane, path, half, unit, freedom=0.45)
+    dense = _Grid(_COARSE, 1)
+    strip, extent = _straighten(photo, plane, path, half, unit, 0.45, dense)
     for freedom in (0.35, 0.25):
-        path = _recentred(strip, extent)
+        path = strip.line.shifted(_middle(strip, extent))
         half = float(np.median(extent.half)) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
-        strip, extent = _straighten(photo, plane, path, half, unit, freedom)
+        strip, extent = _straighten(photo, plane, path, half, unit, freedom, dense)
+    return _refined(photo, plane, strip, extent, unit)
+
+
+def _along_given(photo: Photo, plane: Plane, points: Points, half: float, unit: float) -> _Traced:
+    """Along a path that was given: smooth, so one look at fewer places finds the coarse toes."""
+    _refuse_narrow(photo, 2 * half / unit)
+    path = _extended(photo, plane, points, half)
+    strip, extent = _straighten(photo, plane, path, half, unit, 0.45, _Grid(24, 4))
+    return _refined(photo, plane, strip, extent, unit)
+
+
+def _refined(photo: Photo, plane: Plane, strip: Strip, extent: Extent, unit: float) -> _Traced:
+    middle = _middle(strip, extent)
+    half = float(np.median(extent.half)) * strip.step
+    _refuse_narrow(photo, 2 * half / unit)
     every, along = _row_step(plane, unit)
-    line = fit_centreline(path, along, max(8.0 * half, 16 * unit))
-    rough = _carried(strip, extent, line)
+    line = fit_centreline(strip.line.shifted(middle), along, max(8.0 * half, 16 * unit))
+    rough = _carried(strip, extent, middle, line)
     toes = refine_toes(photo, plane, line, rough, unit, every)
     return _Traced(line.every(every), rough.half, toes)
 
 
 def _sharper_inside(photo: Photo, plane: Plane, traced: _Traced, unit: float) -> float:
     """How many times sharper a band inside is than the toes, each at its weaker side."""
-    if min(toe.blur_px for toe in traced.toes) <= SOFT_PX:
+    if min(toe.blur_px for toe in traced.toes) <= soft_px(2 * traced.half / unit):
         return 0.0
     rows = np.flatnonzero(traced.toes[0].present > 0)
     if len(rows) < _COARSE:
@@ -189,21 +221,19 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     features = stack_texture(strip.opponent, 1.5)
     nearness = np.exp(-0.5 * (strip.offsets / (0.4 * reach)) ** 2).astype(np.float32)
     weight = np.append(nearness, nearness[-1:])
-    band = BandSearch(_blocks(features), 3.0, 0.7 * features.shape[1]).best(weight)
+    every = max(2, len(features) // _SECTIONS)
+    sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
+    band = BandSearch(sections, 3.0, 0.7 * features.shape[1]).best(weight)
     if band is None:
         raise EvidenceError(
             f"{photo.name}: no bead can be told from the plate along the given path; check that "
             "the photo and its calibration belong to this weld"
         )
     middle = strip.offset((band.left + band.right) / 2 - 0.5)
-    rows = (np.arange(band.first, band.last + 1) * 2).clip(0, len(line.s) - 1)
+    rows = (np.arange(band.first, band.last + 1) * every + every // 2).clip(0, len(line.s) - 1)
     points = line.points[rows] + middle[:, None] * line.normals[rows]
     half = float(np.median(band.right - band.left)) / 2 * step
     return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, 0.0, False))
-
-
-def _blocks(features: Features) -> Features:
-    return smoothed(features, 0, 2.0)[::2]
 
 
 def _inside_photo(photo: Photo, plane: Plane, prior: Points) -> Points:
@@ -215,7 +245,7 @@ def _inside_photo(photo: Photo, plane: Plane, prior: Points) -> Points:
     return prior[inside]
 
 
-def _recentred(strip: Strip, extent: Extent) -> Points:
+def _middle(strip: Strip, extent: Extent) -> Floats:
     """The middle between the toes; where a toe is off the photo, the offset of the nearest row."""
     offsets = strip.offset(extent.middle)
     rows = np.arange(len(offsets))
@@ -225,21 +255,29 @@ def _recentred(strip: Strip, extent: Extent) -> Points:
         seen &= strip.valid[rows, np.clip(np.rint(edge).astype(int), 0, columns)]
     if seen.any():
         offsets = np.interp(rows, rows[seen], offsets[seen])
-    return strip.line.shifted(_running_median(offsets, extent.half))
+    return _running_median(offsets, strip, extent)
 
 
 def _straighten(
-    photo: Photo, plane: Plane, path: Points, half: float, unit: float, freedom: float
+    photo: Photo,
+    plane: Plane,
+    path: Points,
+    half: float,
+    unit: float,
+    freedom: float,
+    grid: _Grid,
 ) -> tuple[Strip, Extent]:
-    """The toes in a strip reduced so that half the bead has about `_COARSE` columns."""
-    step = max(unit, half / _COARSE)
-    strip = _sampled(photo, plane, path, half, unit, step, step)
+    """The toes in a strip reduced to the grid."""
+    step = max(unit, half / grid.columns)
+    strip = _sampled(photo, plane, path, half, unit, step * grid.stretch, step)
     features = strip_features(strip.opponent, max(1.5, 0.03 * half / step))
     middle = strip.column(np.zeros(len(strip.line.s)))
     rough = Extent(middle - half / step, middle + half / step, np.zeros(len(strip.line.s)))
+    along = 2.0 / grid.stretch
     try:
-        first = find_toes(features, strip.valid, rough, freedom)
-        return strip, find_toes(features, strip.valid, _calmed(first), 0.6 * freedom)
+        first = find_toes(features, strip.valid, rough, freedom, along)
+        again = _calmed(first, strip)
+        return strip, find_toes(features, strip.valid, again, 0.6 * freedom, along)
     except EvidenceError as error:
         raise EvidenceError(f"{photo.name}: {error}") from error
 
@@ -257,27 +295,30 @@ def _sampled(
     return sample_strip(photo, plane, line, 2.4 * half + 8 * across, across, blur=across / unit)
 
 
-def _carried(strip: Strip, extent: Extent, line: Centreline) -> Rough:
-    """The extent found in a strip as offsets at the rows of another line along the same path."""
+def _carried(strip: Strip, extent: Extent, middle: Floats, line: Centreline) -> Rough:
+    """The extent found in a strip as offsets at the rows of the line through its `middle`."""
+    share = strip.line.s / strip.line.s[-1] * line.s[-1]
 
     def carried(values: Floats) -> Floats:
-        return np.interp(line.s, strip.line.s, values)
+        return np.interp(line.s, share, values)
 
-    left, right = (carried(strip.offset(edge)) for edge in (extent.left, extent.right))
+    left, right = (carried(strip.offset(edge) - middle) for edge in (extent.left, extent.right))
     return Rough(left, right, carried(extent.present))
 
 
-def _calmed(extent: Extent) -> Extent:
+def _calmed(extent: Extent, strip: Strip) -> Extent:
     return Extent(
-        _running_median(extent.left, extent.half),
-        _running_median(extent.right, extent.half),
+        _running_median(extent.left, strip, extent),
+        _running_median(extent.right, strip, extent),
         extent.present,
     )
 
 
-def _running_median(values: Floats, half: Floats) -> Floats:
+def _running_median(values: Floats, strip: Strip, extent: Extent) -> Floats:
+    """Calm over half a width along the strip."""
     from scipy.ndimage import gaussian_filter1d, median_filter
 
-    size = int(max(5, np.median(half)))
+    row = float(strip.line.s[1] - strip.line.s[0])
+    size = int(max(5, np.median(extent.half) * strip.step / row))
     calm = median_filter(values, 2 * (size // 2) + 1, mode="nearest")
     return np.asarray(gaussian_filter1d(calm, size / 4, mode="nearest"))

@@ -1,16 +1,23 @@
 """Bead and plate as zones of the strip: how each looks, and which of the two a place looks like."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from .features import Features
 
 Floats = NDArray[np.float64]
 
-_CLIP = 2.5
+_CLIP = 3.0
+_TEXTURE = 0.3
+"""Weight of the texture's evidence against that of the colours."""
+_SPAN, _BINS = 16, 24
+"""Bins between the 1st and the 99th percentile of a channel, and all of them."""
+_SMOOTH = 2.0
+_RARE = 1e-4
+"""Share that any look has in any zone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,13 +26,6 @@ class Look:
 
     mean: Floats
     covariance: Floats
-
-    def distance(self, features: Features) -> NDArray[np.float32]:
-        """Mahalanobis distance squared plus log determinant, per place."""
-        root = np.linalg.cholesky(np.linalg.inv(self.covariance)).astype(np.float32)
-        away = (features - self.mean.astype(np.float32)) @ root
-        away *= away
-        return np.asarray(away.sum(axis=-1) + np.float32(np.linalg.slogdet(self.covariance)[1]))
 
 
 def look_of(samples: Features) -> Look:
@@ -44,16 +44,36 @@ def zone(columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]) ->
     return (at >= start[:, None]) & (at < stop[:, None]) & valid
 
 
-def bead_likeness(
-    features: Features, bead: Sequence[Look], plate: Sequence[Look]
+def likeness(
+    features: Features, inside: NDArray[np.bool_], outside: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Log-likelihood ratio bead : plate per place, each as its best-fitting look.
+    """Log-likelihood ratio inside : outside per place, by how often its look occurs in each.
 
-    Clipped, so that no single place decides.
+    Colours are counted together, in a smoothed histogram, since a bead has many: metal, slag,
+    glare. Texture is counted by itself and weighs less. Clipped, so that no place decides alone.
     """
-    like_bead = np.minimum.reduce([look.distance(features) for look in bead])
-    like_plate = np.minimum.reduce([look.distance(features) for look in plate])
-    return np.asarray(np.clip(0.5 * (like_plate - like_bead), -_CLIP, _CLIP))
+    colour = _log_ratio(features[..., :-1], inside, outside)
+    texture = _log_ratio(features[..., -1:], inside, outside)
+    ratio = colour + np.float32(_TEXTURE) * texture
+    return np.asarray(np.clip(ratio, -_CLIP, _CLIP), dtype=np.float32)
+
+
+def _log_ratio(
+    features: Features, inside: NDArray[np.bool_], outside: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    low, high = np.percentile(features[inside | outside], (1, 99), axis=0)
+    width = np.maximum((high - low) / _SPAN, 1e-3).astype(np.float32)
+    margin = (_BINS - _SPAN) // 2
+    bins = np.clip((features - low.astype(np.float32)) / width + margin, 0, _BINS - 1)
+    places = bins.astype(np.int32) @ (_BINS ** np.arange(features.shape[-1])).astype(np.int32)
+    shape = (_BINS,) * features.shape[-1]
+    shares = []
+    for zone_ in (inside, outside):
+        counted = np.bincount(places[zone_], minlength=_BINS ** len(shape)).reshape(shape)
+        smooth = gaussian_filter(counted.astype(np.float32), _SMOOTH)
+        shares.append(smooth / max(float(smooth.sum()), 1e-6) + _RARE)
+    ratio = np.log(shares[0] / shares[1]).ravel().astype(np.float32)
+    return np.asarray(ratio[places])
 
 
 def fisher_direction(inside: Features, outside: Features) -> tuple[Floats, float]:
