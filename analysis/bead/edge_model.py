@@ -262,7 +262,8 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     profiles = plain_profiles(signal, centre, model, np.linspace(0, 1, len(near)))
     plain = fit(profiles, model.window, "step", model.blur, 2.5)
     u_noise = _random_u(profiles, plain, model)
-    height = _height(profiles, plain.shift, model.window, model.blur)
+    seen = profiles_at(signal, centre, model.window)
+    height = _height(seen, plain.shift, model.window, model.blur)
     u_model = np.full(len(near), model.u)
     return EdgePlaces(centre + plain.shift, u_noise, u_model, height, model.name, model.blur)
 

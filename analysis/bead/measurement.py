@@ -12,7 +12,11 @@ from .plane import Plane, Points
 
 Floats = NDArray[np.float64]
 
-TOE_DEFINITION = "outer toe: outermost change from the bead's to the plate's appearance"
+TOES = {
+    "metal": "metal: where the look of the weld metal ends; slag and lines beside it are outside",
+    "outer": "outer: where the look of the clean plate begins; slag and lines beside it are inside",
+}
+"""Toe definitions by the name of the option. Two honest readers of a photo differ by this."""
 END = "end of the bead"
 """Reason of the stations at a start or stop, where the bead is round and has no width."""
 
@@ -46,7 +50,7 @@ class BeadMeasurement:
     direction_known: bool
     open_start: bool
     open_stop: bool
-    toe_definition: str = TOE_DEFINITION
+    toe_definition: str = TOES["metal"]
 
     @property
     def good(self) -> NDArray[np.bool_]:
@@ -67,9 +71,16 @@ class BeadDetector(Protocol):
     """Measures the bead in a photo; plug-ins of the group `seamlog.bead_detectors`."""
 
     def __call__(
-        self, photo: Photo, plane: Plane, prior: Points | None = None, start: str | None = None
+        self,
+        photo: Photo,
+        plane: Plane,
+        prior: Points | None = None,
+        start: str | None = None,
+        toe: str = "metal",
     ) -> BeadMeasurement:
         """Measure; `prior` is a path in the plane's unit, `start` left, right, top or bottom.
+
+        `toe` is a key of `TOES`.
 
         Raises `EvidenceError` where no bead can be told from the plate.
         """

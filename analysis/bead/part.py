@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -38,11 +38,12 @@ Pictures = Mapping[str, tuple[bytes, Picture]]
 
 
 class BeadConfig(BaseModel):
-    """Section `bead` of the configuration: the detector, and the user's limits if any."""
+    """Section `bead` of the configuration: detector, toe definition, the user's limits if any."""
 
     model_config = ConfigDict(extra="forbid")
 
     detector: str = "strip"
+    toe: Literal["metal", "outer"] = "metal"
     min_width_mm: float | None = None
     max_width_mm: float | None = None
     max_width_cv: float | None = None
@@ -79,9 +80,9 @@ def measure_photo(
     measurement = None
     if seam_mm is not None and plane.in_table_frame:
         with contextlib.suppress(EvidenceError):
-            measurement = detector(photo, plane, seam_mm, start)
+            measurement = detector(photo, plane, seam_mm, start, config.toe)
     if measurement is None:
-        measurement = detector(photo, plane, start=start)
+        measurement = detector(photo, plane, start=start, toe=config.toe)
     return BeadResult(photo, measurement, uniformity(measurement), plane, calibration)
 
 

@@ -42,7 +42,7 @@ _WINDOW_PX = 18
 _TRIED_ROWS = 160
 _SENSOR_PX = 0.04
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
-_RASTER_PX = 0.03
+_RASTER_PX = 0.025
 """Standard uncertainty that the raster and the unknown shape of the blur leave at the longest."""
 _SHARP_PX = 2.0
 """Blur up to which a toe is not looked at twice."""

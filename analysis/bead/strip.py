@@ -1,6 +1,6 @@
 """The strip method: straighten the bead, find its toes, recentre, repeat, refine below a pixel."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from .core import band_inside, softness
 from .curve import Centreline, arc_length, fit_centreline
 from .features import smoothed, stack_texture, strip_features
 from .image import Photo
-from .measurement import BeadMeasurement
+from .measurement import TOES, BeadMeasurement
 from .path import find_paths
 from .plane import Plane, Points
 from .refine import Rough, refine_toes
@@ -30,7 +30,10 @@ STATION_PX = 2.0
 NARROWEST_PX = 8.0
 _CLEAR = 0.5
 """Confidence from which on no other candidate is tried."""
-_COARSE = 40
+_ENOUGH = 40
+"""Stations from which on a band inside is looked for."""
+_BEYOND = {"metal": 0.06, "outer": 0.25}
+"""Half widths beside a toe, by its definition, that are neither bead nor plate at first."""
 _SECTIONS = 48
 """Sections in which the band along a given path is looked for."""
 
@@ -45,11 +48,17 @@ class _Path:
 
 
 @dataclass(frozen=True, slots=True)
-class _Grid:
-    """Columns of half the bead in a strip that toes are traced in, and its row : column step."""
+class _Tracing:
+    """How coarse toes are traced: in one strip after the other, each recentred on the last.
+
+    `columns` of half the bead, `stretch` rows : columns, `freedoms` around the last toes in half
+    widths, and the half widths `beyond` a toe at which the plate's look begins.
+    """
 
     columns: int
     stretch: int
+    freedoms: tuple[float, ...]
+    beyond: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +70,12 @@ class _Traced:
     toes: tuple[Toes, Toes]
 
 
-_Tracer = Callable[[Photo, Plane, Points, float, float], _Traced]
-
-
 def measure_strip(
-    photo: Photo, plane: Plane, prior: Points | None = None, start: str | None = None
+    photo: Photo,
+    plane: Plane,
+    prior: Points | None = None,
+    start: str | None = None,
+    toe: str = "metal",
 ) -> BeadMeasurement:
     """Measure bead width at stations along the bead; see `BeadDetector`.
 
@@ -73,20 +83,25 @@ def measure_strip(
     `EvidenceError` where no bead can be told from the plate and `ImageError` for one narrower
     than 8 px.
     """
+    beyond = _BEYOND[toe]
     if prior is not None:
-        return _measure(photo, plane, _given_path(photo, plane, prior), start, _along_given)
-    return _most_trusted(photo, plane, _found_paths(photo, plane), start)
+        sparse = _Tracing(24, 4, (0.45,), beyond)
+        measured = _measure(photo, plane, _given_path(photo, plane, prior), start, sparse)
+    else:
+        dense = _Tracing(40, 1, (0.45, 0.35, 0.25), beyond)
+        measured = _most_trusted(photo, plane, _found_paths(photo, plane), start, dense)
+    return replace(measured, toe_definition=TOES[toe])
 
 
 def _most_trusted(
-    photo: Photo, plane: Plane, paths: Sequence[_Path], start: str | None
+    photo: Photo, plane: Plane, paths: Sequence[_Path], start: str | None, tracing: _Tracing
 ) -> BeadMeasurement:
     """The first measurement that can be trusted, else the one with the least doubt."""
     best: BeadMeasurement | None = None
     refusal: Exception | None = None
     for path in paths:
         try:
-            measured = _measure(photo, plane, path, start)
+            measured = _measure(photo, plane, path, start, tracing)
         except (EvidenceError, ImageError) as error:
             refusal = refusal or error
             continue
@@ -101,60 +116,47 @@ def _most_trusted(
 
 
 def _measure(
-    photo: Photo, plane: Plane, found: _Path, start: str | None, trace: _Tracer | None = None
+    photo: Photo, plane: Plane, found: _Path, start: str | None, tracing: _Tracing
 ) -> BeadMeasurement:
     unit = plane.unit_per_px(plane.to_px(found.points))
-    traced = (trace or _traced)(photo, plane, found.points, found.half, unit)
-    band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit))
+    traced = _traced(photo, plane, found.points, found.half, unit, tracing)
+    band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit, tracing))
     return assemble(photo, plane, traced.line, traced.toes, unit, band, start)
 
 
-def _traced(photo: Photo, plane: Plane, points: Points, half: float, unit: float) -> _Traced:
-    """Along a path found in the photo: coarse, so its toes are traced and recentred repeatedly."""
+def _traced(
+    photo: Photo, plane: Plane, points: Points, half: float, unit: float, tracing: _Tracing
+) -> _Traced:
     _refuse_narrow(photo, 2 * half / unit)
     path = _extended(photo, plane, points, half)
-    dense = _Grid(_COARSE, 1)
-    strip, extent = _straighten(photo, plane, path, half, unit, 0.45, dense)
-    for freedom in (0.35, 0.25):
-        path = strip.line.shifted(_middle(strip, extent))
+    for freedom in tracing.freedoms:
+        strip, extent = _straighten(photo, plane, path, half, unit, freedom, tracing)
+        middle = _middle(strip, extent)
+        path = strip.line.shifted(middle)
         half = float(np.median(extent.half)) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
-        strip, extent = _straighten(photo, plane, path, half, unit, freedom, dense)
-    return _refined(photo, plane, strip, extent, unit)
-
-
-def _along_given(photo: Photo, plane: Plane, points: Points, half: float, unit: float) -> _Traced:
-    """Along a path that was given: smooth, so one look at fewer places finds the coarse toes."""
-    _refuse_narrow(photo, 2 * half / unit)
-    path = _extended(photo, plane, points, half)
-    strip, extent = _straighten(photo, plane, path, half, unit, 0.45, _Grid(24, 4))
-    return _refined(photo, plane, strip, extent, unit)
-
-
-def _refined(photo: Photo, plane: Plane, strip: Strip, extent: Extent, unit: float) -> _Traced:
-    middle = _middle(strip, extent)
-    half = float(np.median(extent.half)) * strip.step
-    _refuse_narrow(photo, 2 * half / unit)
     every, along = _row_step(plane, unit)
-    line = fit_centreline(strip.line.shifted(middle), along, max(8.0 * half, 16 * unit))
+    line = fit_centreline(path, along, max(8.0 * half, 16 * unit))
     rough = _carried(strip, extent, middle, line)
     toes = refine_toes(photo, plane, line, rough, unit, every)
     return _Traced(line.every(every), rough.half, toes)
 
 
-def _sharper_inside(photo: Photo, plane: Plane, traced: _Traced, unit: float) -> float:
+def _sharper_inside(
+    photo: Photo, plane: Plane, traced: _Traced, unit: float, tracing: _Tracing
+) -> float:
     """How many times sharper a band inside is than the toes, each at its weaker side."""
     if min(toe.blur_px for toe in traced.toes) <= soft_px(2 * traced.half / unit):
         return 0.0
     rows = np.flatnonzero(traced.toes[0].present > 0)
-    if len(rows) < _COARSE:
+    if len(rows) < _ENOUGH:
         return 0.0
     middle = traced.line.shifted((traced.toes[0].offset + traced.toes[1].offset) / 2)[rows]
     found = band_inside(photo, plane, middle, traced.half, unit)
     if found is None:
         return 0.0
     try:
-        inner = _traced(photo, plane, *found, unit)
+        inner = _traced(photo, plane, *found, unit, tracing)
     except (EvidenceError, ImageError):
         return 0.0
     inside = max(softness(photo, plane, inner.line, inner.toes, unit))
@@ -166,7 +168,7 @@ def _extended(photo: Photo, plane: Plane, path: Points, half: float) -> Points:
 
     Only past its end can be seen that a bead ends.
     """
-    beyond = np.arange(0.5, 2.01, 0.5)[:, None] * half
+    beyond = np.arange(0.1, 2.01, 0.1)[:, None] * half
     before = path[0] + beyond * _heading(path[::-1], 3 * half)
     after = path[-1] + beyond * _heading(path, 3 * half)
     before, after = (more[_in_photo(photo, plane.to_px(more))] for more in (before, after))
@@ -265,19 +267,19 @@ def _straighten(
     half: float,
     unit: float,
     freedom: float,
-    grid: _Grid,
+    tracing: _Tracing,
 ) -> tuple[Strip, Extent]:
-    """The toes in a strip reduced to the grid."""
-    step = max(unit, half / grid.columns)
-    strip = _sampled(photo, plane, path, half, unit, step * grid.stretch, step)
+    """The toes in a strip reduced to the tracing."""
+    step = max(unit, half / tracing.columns)
+    strip = _sampled(photo, plane, path, half, unit, step * tracing.stretch, step)
     features = strip_features(strip.opponent, max(1.5, 0.03 * half / step))
     middle = strip.column(np.zeros(len(strip.line.s)))
     rough = Extent(middle - half / step, middle + half / step, np.zeros(len(strip.line.s)))
-    along = 2.0 / grid.stretch
+    along = 2.0 / tracing.stretch
     try:
-        first = find_toes(features, strip.valid, rough, freedom, along)
+        first = find_toes(features, strip.valid, rough, freedom, along, tracing.beyond)
         again = _calmed(first, strip)
-        return strip, find_toes(features, strip.valid, again, 0.6 * freedom, along)
+        return strip, find_toes(features, strip.valid, again, 0.6 * freedom, along, tracing.beyond)
     except EvidenceError as error:
         raise EvidenceError(f"{photo.name}: {error}") from error
 

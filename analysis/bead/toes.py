@@ -21,7 +21,6 @@ _CORE = 0.85
 """Part of the half width that shows how the bead looks."""
 _BESIDE = 0.8
 """Half widths of plate, from the toe, that show how it looks."""
-_BEGIN = 0.06
 _MOVE = 0.4
 
 
@@ -49,11 +48,17 @@ class Extent:
 
 
 def find_toes(
-    features: Features, valid: NDArray[np.bool_], rough: Extent, freedom: float, along: float
+    features: Features,
+    valid: NDArray[np.bool_],
+    rough: Extent,
+    freedom: float,
+    along: float,
+    beyond: float,
 ) -> Extent:
     """Toes near a rough extent: within `freedom` (fraction of the half width) of it.
 
-    Features are averaged over `along` rows (Gaussian sigma).
+    Features are averaged over `along` rows (Gaussian sigma). Between a toe and `beyond` half
+    widths outside of it nothing counts as plate beforehand.
     """
     smooth = smoothed(features, 0.8, along)
     columns = features.shape[1]
@@ -65,7 +70,7 @@ def find_toes(
     core = zone(columns, rough.middle - 0.7 * half, rough.middle + 0.7 * half, valid)
     toes, present = [], np.full(len(rough.left), np.inf)
     for side, edge in ((-1, rough.left), (1, rough.right)):
-        like = likeness(smooth, bead, _plate(columns, edge, side, half, valid))
+        like = likeness(smooth, bead, _plate(columns, edge, side, half, beyond, valid))
         toes.append(_toe(like, edges, edge, side, half, freedom, valid))
         inside = np.where(core, like, 0).sum(axis=1) / np.maximum(core.sum(axis=1), 1)
         present = np.minimum(present, inside)
@@ -73,11 +78,11 @@ def find_toes(
 
 
 def _plate(
-    columns: int, edge: Floats, side: int, half: float, valid: NDArray[np.bool_]
+    columns: int, edge: Floats, side: int, half: float, beyond: float, valid: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """The plate beside one toe. It begins right at the toe: slag and spatter there are no bead."""
+    """The plate beside one toe. Nearest to it slag and spatter may belong to either."""
     for reach in (_BESIDE * half + 4, 0.3 * half):
-        first = 1 + _BEGIN * half
+        first = 1 + beyond * half
         bounds = (edge + first, edge + reach) if side > 0 else (edge - reach, edge - first)
         mask = zone(columns, *bounds, valid)
         if mask.sum() >= _ENOUGH:
