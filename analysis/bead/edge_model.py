@@ -75,13 +75,15 @@ class Window:
 class EdgePlaces:
     """Per row: column of the edge, its random standard uncertainty, that of the model, the step.
 
-    `model` says what lies beside the step, `blur_px` how blurred the edge is.
+    `bare` is the step without the shading beside it, `model` says what that is, `blur_px` how
+    blurred the edge is.
     """
 
     column: Floats
     u_noise: Floats
     u_model: Floats
     height: Floats
+    bare: Floats
     model: str
     blur_px: float
 
@@ -188,8 +190,16 @@ def _best_blur(means: Floats, window: Window, model: str) -> tuple[float, float,
     a, b, c = logs[at - 1 : at + 2]
     move = float(np.clip(0.5 * (a - c) / max(a - 2 * b + c, 1e-9), -1, 1))
     blur = round(float(_BLURS_PX[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move), 2)
-    nearest = int(np.argmin(logs))
-    return float(b - 0.25 * (a - c) * move), blur, shifts[captured[:, nearest].argmax(axis=1)]
+    places, _, _ = _peak(captured[:, int(np.argmin(logs))], shifts)
+    return float(b - 0.25 * (a - c) * move), blur, places
+
+
+def _peak(captured: Floats, shifts: Floats) -> tuple[Floats, Floats, Floats]:
+    """Shift of each row's most captured energy, that energy, its (negative) second difference."""
+    peak = np.clip(np.argmax(captured, axis=1), 1, len(shifts) - 2)
+    a, b, c = (captured[np.arange(len(peak)), peak + k] for k in (-1, 0, 1))
+    curvature = np.minimum(a - 2 * b + c, -1e-9)
+    return shifts[peak] + np.clip(0.5 * (a - c) / curvature, -1, 1) * _STEP, b, curvature
 
 
 def _parameters(model: str) -> int:
@@ -203,12 +213,9 @@ def fit(profiles: Floats, window: Window, model: str, blur: float, reach: float)
     weighted = (profiles - profiles.mean(axis=1, keepdims=True)) * window.weight
     projected = weighted @ bases
     captured = (projected**2).reshape(len(profiles), len(shifts), -1).sum(axis=2)
-    peak = np.clip(np.argmax(captured, axis=1), 1, len(shifts) - 2)
-    a, b, c = (captured[np.arange(len(peak)), peak + k] for k in (-1, 0, 1))
-    curvature = np.minimum(a - 2 * b + c, -1e-9)
-    move = np.clip(0.5 * (a - c) / curvature, -1, 1)
-    misfit = np.maximum((weighted**2).sum(axis=1) - b, 1e-9)
-    return Fit(shifts[peak] + move * _STEP, misfit, _STEP**2 / (-0.5 * curvature))
+    places, most, curvature = _peak(captured, shifts)
+    misfit = np.maximum((weighted**2).sum(axis=1) - most, 1e-9)
+    return Fit(places, misfit, _STEP**2 / (-0.5 * curvature))
 
 
 @cache
@@ -264,8 +271,9 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     u_noise = _random_u(profiles, plain, model)
     seen = profiles_at(signal, centre, model.window)
     height = _height(seen, plain.shift, model.window, model.blur)
+    bare = _height(profiles, plain.shift, model.window, model.blur)
     u_model = np.full(len(near), model.u)
-    return EdgePlaces(centre + plain.shift, u_noise, u_model, height, model.name, model.blur)
+    return EdgePlaces(centre + plain.shift, u_noise, u_model, height, bare, model.name, model.blur)
 
 
 def plain_profiles(

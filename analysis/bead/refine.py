@@ -42,7 +42,7 @@ _WINDOW_PX = 18
 _TRIED_ROWS = 160
 _SENSOR_PX = 0.04
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
-_RASTER_PX = 0.025
+_RASTER_PX = 0.02
 """Standard uncertainty that the raster and the unknown shape of the blur leave at the longest."""
 _SHARP_PX = 2.0
 """Blur up to which a toe is not looked at twice."""
@@ -186,6 +186,7 @@ class _Side:
             u_noise=places.u_noise * self._unit,
             u_model=np.sqrt(places.u_model**2 + smeared**2 + _RASTER_PX**2) * self._unit,
             height=places.height,
+            bare=places.bare,
             in_frame=self._valid[pick][rows, outside],
             present=self._rough.present[pick],
             disagreement=np.abs(inward) * self._unit,

@@ -37,7 +37,8 @@ class BandEvidence:
 class Toes:
     """One side's toes, a value per station: offset and its uncertainties in the plane's unit.
 
-    `height` is the step from plate to bead (grey levels), `in_frame` whether the plate beyond is
+    `height` is the step from plate to bead (grey levels), `bare` that without the shading
+    beside it, `in_frame` whether the plate beyond is
     in the photo, `present` how much the inside looks like bead, `disagreement` the distance
     between the sharpest edge and where the looks change. `distance` is how far bead and plate are
     apart at this toe, in standard deviations.
@@ -47,6 +48,7 @@ class Toes:
     u_noise: Floats
     u_model: Floats
     height: Floats
+    bare: Floats
     in_frame: NDArray[np.bool_]
     present: Floats
     disagreement: Floats
@@ -79,7 +81,8 @@ def assemble(
     flagged = reasons != ""
     ends = [_at_frame(photo, centre_px[end], typical / unit) for end in _ends_of(bead)]
     length = np.inf if all(ends) else float(np.ptp(line.s[bead]))
-    found = doubts(_evidence(toes, flagged[bead], typical, band, unit, length))
+    weak = flagged | _faint(left.bare) | _faint(right.bare)
+    found = doubts(_evidence(toes, weak[bead], typical, band, unit, length))
     confidence = found[0].confidence
     if confidence < _REFUSED:
         raise EvidenceError(
@@ -149,11 +152,15 @@ def _reasons(
     for name, toe in (("left", left), ("right", right)):
         reasons[_strays(toe.offset, typical, line)] = f"{name} toe strays"
         reasons[toe.u_noise > _FAINT * typical] = f"{name} toe too faint"
-        reasons[toe.height < 0.15 * np.median(toe.height)] = f"{name} toe not told from the plate"
+        reasons[_faint(toe.height)] = f"{name} toe not told from the plate"
         reasons[~toe.in_frame] = f"{name} toe at the frame of the photo"
     reasons[left.present < 0] = "no bead seen"
     reasons[width <= 0] = "no width"
     return reasons
+
+
+def _faint(height: Floats) -> NDArray[np.bool_]:
+    return np.asarray(height < 0.15 * np.median(height))
 
 
 def _strays(offset: Floats, typical: float, line: Centreline) -> NDArray[np.bool_]:
@@ -189,7 +196,7 @@ def _evidence(
         inner=band.inner,
         nested=band.nested,
         sharper=band.sharper,
-        step_grey=min(float(np.median(np.abs(toe.height))) for toe in toes),
+        step_grey=min(float(np.median(np.abs(toe.bare))) for toe in toes),
         lengths=length / typical,
         width_px=typical / step,
         astray=astray / max(typical, step),
