@@ -51,7 +51,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
     """All doubts, the worst first; the confidence of a width is that of its worst doubt."""
     e = evidence
     inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
-    tinted = inside * np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
+    tinted = max(inside, 0.5) * np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),
