@@ -82,11 +82,14 @@ def usual_band(width_mm: Floats, low_mm: float | None, high_mm: float | None) ->
     return Band(low, high, "limits of the configuration")
 
 
-def find_excursions(s_mm: Floats, width_mm: Floats, band: Band) -> list[Excursion]:
-    """Stretches outside `band`; near ones on the same side are one."""
+def find_excursions(
+    s_mm: Floats, width_mm: Floats, u_mm: Floats | float, band: Band
+) -> list[Excursion]:
+    """Stretches outside `band` by more than U = 2 u; near ones on the same side are one."""
     calm = _running_median(width_mm, 5)
+    guard = 2.0 * np.asarray(u_mm)
     found = []
-    for side, outside in ((1, calm > band.high_mm), (-1, calm < band.low_mm)):
+    for side, outside in ((1, calm - guard > band.high_mm), (-1, calm + guard < band.low_mm)):
         for first, last in _runs(outside, s_mm):
             if s_mm[last] - s_mm[first] >= _SHORTEST_MM:
                 found.append(_excursion(s_mm, calm, band, side, first, last))

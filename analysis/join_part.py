@@ -116,8 +116,8 @@ def _explained(columns: dict[str, NDArray[Any]], band: Band) -> list[tuple[Excur
     channels = _channels(columns)
     least = {name: 0.005 * float(np.nanmedian(np.abs(v))) for name, v in channels.items()}
     least["tracking_error"] = 0.02
-    excursions = find_excursions(columns["s_mm"], columns["width_mm"], band)
-    width = columns["width_mm"]
+    width, u_mm = columns["width_mm"], columns["u_width_mm"]
+    excursions = find_excursions(columns["s_mm"], width, u_mm, band)
     return [(each, rank_causes(each, width, channels, least)) for each in excursions]
 
 

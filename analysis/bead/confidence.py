@@ -61,7 +61,10 @@ def doubts(evidence: Evidence) -> list[Doubt]:
         (1.3 - e.astray / 0.1, "the sharpest edges are not where the looks change"),
         (e.step_grey / 8, f"a toe's step is {e.step_grey:.1f} grey levels only"),
         (e.lengths / 10, f"it is {e.lengths:.1f} times as long as wide: a bead is longer"),
-        (0.45 if e.nested else 1.0, "it lies inside a broader band that is as evident"),
+        (
+            0.45 if e.nested else 1.0,
+            "it lies inside a broader band that is as evident: a heat tint?",
+        ),
         (1 - 0.75 * tinted, "its edges are soft and a narrower band lies inside: a heat tint?"),
     ]
     judged = [Doubt(float(np.clip(value, 0, 1)), sentence) for value, sentence in found]

@@ -24,13 +24,13 @@ def rough(size: float) -> np.ndarray:
 
 def test_an_even_bead_has_no_excursion() -> None:
     width = 6 + rough(0.03)
-    assert find_excursions(S_MM, width, usual_band(width, None, None)) == []
+    assert find_excursions(S_MM, width, 0.0, usual_band(width, None, None)) == []
 
 
 def test_excursions_are_found_on_both_sides_with_gaps_between() -> None:
     width = 6 + rough(0.03) + 1.5 * bump(120, 3) - 1.2 * bump(50, 3)
     width[300:304] = np.nan
-    narrow, wide = find_excursions(S_MM, width, usual_band(width, None, None))
+    narrow, wide = find_excursions(S_MM, width, 0.0, usual_band(width, None, None))
     assert narrow.s_mm == pytest.approx(50, abs=1)
     assert wide.s_mm == pytest.approx(120, abs=1)
     assert wide.peak_width_mm == pytest.approx(7.5, abs=0.1)
@@ -39,8 +39,8 @@ def test_excursions_are_found_on_both_sides_with_gaps_between() -> None:
 
 def test_limits_of_the_user_make_the_band() -> None:
     width = 6 + 0.5 * bump(80, 20)
-    assert find_excursions(S_MM, width, usual_band(width, 5.0, 7.0)) == []
-    found = find_excursions(S_MM, width, usual_band(width, None, 6.3))
+    assert find_excursions(S_MM, width, 0.0, usual_band(width, 5.0, 7.0)) == []
+    found = find_excursions(S_MM, width, 0.0, usual_band(width, None, 6.3))
     assert [round(item.s_mm) for item in found] == [80]
 
 
@@ -53,7 +53,7 @@ def test_the_channel_that_moved_leads_the_ranking() -> None:
         "command": 5 * np.sin(S_MM / 15) + rough(0.1),
         "current": 180 + rough(2.0),
     }
-    (place,) = find_excursions(S_MM, width, usual_band(width, None, None))
+    (place,) = find_excursions(S_MM, width, 0.0, usual_band(width, None, None))
     first, second, *_ = rank_causes(place, width, channels, {})
     assert first.channel == "weld_speed"
     assert first.moved
@@ -64,13 +64,13 @@ def test_the_channel_that_moved_leads_the_ranking() -> None:
 def test_no_channel_is_blamed_when_none_moved() -> None:
     width = 6 + rough(0.05) + 1.5 * bump(120, 4)
     channels = {"weld_speed": 6 + rough(0.05), "current": 180 + rough(2.0)}
-    (place,) = find_excursions(S_MM, width, usual_band(width, None, None))
+    (place,) = find_excursions(S_MM, width, 0.0, usual_band(width, None, None))
     assert not any(cause.moved for cause in rank_causes(place, width, channels, {}))
 
 
 def test_channels_that_were_not_logged_are_left_out() -> None:
     width = 6 + rough(0.05) + 1.5 * bump(120, 4)
-    (place,) = find_excursions(S_MM, width, usual_band(width, None, None))
+    (place,) = find_excursions(S_MM, width, 0.0, usual_band(width, None, None))
     assert rank_causes(place, width, {"current": np.full(len(S_MM), np.nan)}, {}) == []
 
 
@@ -82,3 +82,11 @@ def test_lag_of_the_width_behind_the_channel() -> None:
     assert r == pytest.approx(-1, abs=0.02)
     assert lag_mm == pytest.approx(3.0, abs=0.3)
     assert lagged_correlation(S_MM, np.full(len(S_MM), 6.0), channel[:800]) is None
+
+
+def test_what_its_uncertainty_explains_is_no_excursion() -> None:
+    width = np.full(len(S_MM), 6.0)
+    width[200:240] = 6.5
+    band = usual_band(width, None, 6.3)
+    assert len(find_excursions(S_MM, width, 0.09, band)) == 1
+    assert find_excursions(S_MM, width, 0.11, band) == []
