@@ -1,5 +1,6 @@
 """How far a measured width may be trusted: what could be wrong with it, each as a doubt."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -48,7 +49,7 @@ class Doubt:
 
 
 def doubts(evidence: Evidence) -> list[Doubt]:
-    """All doubts, the worst first; the confidence of a width is that of its worst doubt."""
+    """All doubts, the worst first."""
     e = evidence
     inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
     tinted = max(inside, 0.5) * np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
@@ -69,6 +70,11 @@ def doubts(evidence: Evidence) -> list[Doubt]:
     ]
     judged = [Doubt(float(np.clip(value, 0, 1)), sentence) for value, sentence in found]
     return sorted(judged, key=lambda doubt: doubt.confidence)
+
+
+def confidence(found: Sequence[Doubt]) -> float:
+    """That none of the doubts is true, 0 to 1: they are about different things and multiply."""
+    return math.prod(doubt.confidence for doubt in found)
 
 
 def serious(found: Sequence[Doubt]) -> list[str]:

@@ -8,7 +8,7 @@ from scipy.ndimage import median_filter
 
 from seamlog.errors import EvidenceError
 
-from .confidence import Doubt, Evidence, doubts, serious
+from .confidence import Doubt, Evidence, confidence, doubts, serious
 from .curve import Centreline
 from .image import Photo
 from .measurement import END, TRUSTED, BeadMeasurement
@@ -83,11 +83,11 @@ def assemble(
     length = np.inf if all(ends) else float(np.ptp(line.s[bead]))
     weak = flagged | _faint(left.bare) | _faint(right.bare)
     found = doubts(_evidence(toes, weak[bead], typical, band, unit, length))
-    confidence = found[0].confidence
-    if confidence < _REFUSED:
+    sure = confidence(found)
+    if found[0].confidence < _REFUSED:
         raise EvidenceError(
             f"{photo.name}: a band was found, but its width cannot be told (confidence "
-            f"{confidence:.2f}): {found[0].sentence}; take a sharper photo with even light, "
+            f"{sure:.2f}): {found[0].sentence}; take a sharper photo with even light, "
             "from above"
         )
     u_noise = np.hypot(left.u_noise, right.u_noise)
@@ -107,7 +107,7 @@ def assemble(
         flagged=flagged[bead][order],
         reason=tuple(str(reason) for reason in reasons[bead][order]),
         unit_per_px=unit,
-        confidence=confidence,
+        confidence=sure,
         warnings=_warnings(plane, found),
         starts_at=starts_at,
         direction_known=start is not None,
@@ -208,8 +208,8 @@ def _warnings(plane: Plane, found: list[Doubt]) -> tuple[str, ...]:
     warnings = serious(found)
     if plane.unit == "px":
         warnings.insert(0, "no calibration: widths are in pixels, not in millimetres")
-    if found[0].confidence < TRUSTED:
-        warnings.append(f"confidence is low ({found[0].confidence:.2f}): check the overlay")
+    if confidence(found) < TRUSTED:
+        warnings.append(f"confidence is low ({confidence(found):.2f}): check the overlay")
     return tuple(warnings)
 
 

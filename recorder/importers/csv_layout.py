@@ -95,7 +95,7 @@ def split(line: str, separator: str) -> list[str]:
     """Cells of a line, without quotes and blanks around them."""
     import csv
 
-    line = line.lstrip("#%")
+    line = line.lstrip("#%").replace("\r", " ")  # the csv module takes a lone one for a new line
     if separator == " ":
         return line.split()
     cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
