@@ -61,7 +61,8 @@ def case(name: str, seeds: int) -> Iterator[Figure]:
     limit = f"<= {RMS_PX[name]}" if name in RMS_PX else ""
     yield Figure(f"{name}: width error, rms", rms, "px", limit)
     share = 100 * float(np.mean(np.concatenate(covered)))
-    yield Figure(f"{name}: within 1.96 u", share, "%", f">= {COVERAGE.get(name, 0)}")
+    limit = f">= {COVERAGE[name]}" if name in COVERAGE else ""
+    yield Figure(f"{name}: within 1.96 u", share, "%", limit)
     yield Figure(f"{name}: lost without a flag", silent, "", "<= 0")
     yield Figure(f"{name}: flagged", 100 * float(np.mean(np.concatenate(flagged))), "%", "<= 2")
     limit = f"<= {UNEVEN[name]}" if name in UNEVEN else ""

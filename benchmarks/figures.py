@@ -24,7 +24,8 @@ class Figure:
         if not self.target:
             return None
         relation, bound = self.target.split()
-        return self.value >= float(bound) if relation == ">=" else self.value <= float(bound)
+        holds = self.value >= float(bound) if relation == ">=" else self.value <= float(bound)
+        return bool(holds)
 
 
 def options(description: str | None) -> argparse.Namespace:
