@@ -20,7 +20,7 @@ from .fixed import RING_BYTES, fixed_put, fixed_ring
 from .folder import OutTray
 from .gate import Gate
 from .pictures import picture_payload
-from .put_source import Put, Stop
+from .put_source import Put, PutNamed, Stop
 from .ring import Ring, create_ring
 from .varying import Encode, VaryingWriter
 
@@ -40,8 +40,7 @@ class Channel:
     metadata: Mapping[str, str]
     put: Put
     """`put(stamp_ns, *values) -> bool`, values in the table's order."""
-    put_named: Put
-    """`put_named(stamp_ns, **fields) -> bool`; `TypeError` for fields that are not the topic's."""
+    put_named: PutNamed
     put_frame: Callable[[int, NDArray[Any]], bool]
     stop: Stop
     """Take nothing more."""
@@ -80,8 +79,8 @@ def make_channel(
     if is_fixed(row):
         ring = fixed_ring(path, channel_id, layout(topic))
         gate = gate_to(topic, ring)
-        put, stop = fixed_put(ring, gate, layout(topic), clock)
-        channel = Channel(topic, metadata, put, put, _no_pictures(gate), stop, gate)
+        put, put_named, stop = fixed_put(ring, gate, layout(topic), clock)
+        channel = Channel(topic, metadata, put, put_named, _no_pictures(gate), stop, gate)
     else:
         ring = _varying_ring(path, row)
         gate = gate_to(topic, ring)
@@ -104,11 +103,11 @@ def producer_name() -> str:
     return "main" if thread is threading.main_thread() else thread.name
 
 
-def _named(put: Put, topic: str) -> Put:
+def _named(put: Put, topic: str) -> PutNamed:
     """`put` by field names for one that takes values in the table's order."""
     names = CHANNELS[topic].field_names[1:]
 
-    def put_named(stamp_ns: int, **fields: Any) -> bool:
+    def put_named(stamp_ns: int, fields: Mapping[str, Any]) -> bool:
         if set(fields) != set(names):
             raise TypeError(f"{topic} has the fields {names}")
         return put(stamp_ns, *(fields[name] for name in names))

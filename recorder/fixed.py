@@ -18,7 +18,7 @@ from seamlog.clock import Clock, MonotonicClock
 from seamlog.messages import Layout, split_array
 
 from .gate import Gate
-from .put_source import Put, Stop, put_maker
+from .put_source import Put, PutNamed, Stop, put_maker
 from .ring import MESSAGE, RECORD_HEAD_BYTES, Ring, create_ring
 
 RING_BYTES = 2 << 20
@@ -48,18 +48,19 @@ def log_time_parts(clock: Clock) -> tuple[Callable[[], int], int]:
     return clock.now_ns, 0
 
 
-def fixed_put(ring: Ring, gate: Gate, layout: Layout, clock: Clock) -> tuple[Put, Stop]:
-    """`put(stamp_ns, *values)` for a ring of `fixed_ring`, and what ends it."""
+def fixed_put(ring: Ring, gate: Gate, layout: Layout, clock: Clock) -> tuple[Put, PutNamed, Stop]:
+    """`put(stamp_ns, *values)` for a ring of `fixed_ring`, the same by names, what ends both."""
     now, anchor = log_time_parts(clock)
     bodies = ring.data[_FRONT.size :]
     pack_into = _body(layout).pack_into
     make = put_maker(layout)
-    put, stop = make(
+    put, put_named, stop = make(
         pack_into, bodies, ring.words, ring.slots, ring.stride, now, anchor, gate.owner, gate
     )
     if any("[" in kind for kind in layout.kinds):
         put = _flattened(put, gate, layout)
-    return put, stop
+        return put, lambda stamp_ns, fields: put(stamp_ns, **fields), stop
+    return put, put_named, stop
 
 
 def _flattened(put: Put, gate: Gate, layout: Layout) -> Put:

@@ -19,7 +19,7 @@ from .accounts import Account, ring_account
 from .channel import Channel, known_row, make_channel, producer_name
 from .folder import OutTray, Recording
 from .gate import Gate
-from .put_source import Put
+from .put_source import PutNamed
 from .ring import TAKEN_IN, Ring
 
 _INTAKE_S = 2.0
@@ -56,13 +56,13 @@ class Producer(ABC):
     def log(self, topic: str, stamp_ns: int | None = None, **fields: Any) -> bool:
         """Log one message by field names; False if it was not accepted."""
         try:
-            put: Put = self._mine.puts[topic]
+            put: PutNamed = self._mine.puts[topic]
         except (AttributeError, KeyError):
             put = self._late_put(topic)
         if stamp_ns is None:
             stamp_ns = self.clock.now_ns()
         try:
-            return put(stamp_ns, **fields)
+            return put(stamp_ns, fields)
         except TypeError:
             return self._channels[topic, get_ident()].refuse_names(fields)
 
@@ -150,10 +150,10 @@ class Producer(ABC):
         waits = self._recording.pace == "simulated"
         return Gate(topic, ring, waits, self.strict, self._is_alive)
 
-    def _late_put(self, topic: str) -> Put:
+    def _late_put(self, topic: str) -> PutNamed:
         channel = self._late_channel(topic)
         if channel is None:
-            return lambda *_, **__: self._turn_away(topic)
+            return lambda *_: self._turn_away(topic)
         self._mine.__dict__.setdefault("puts", {})[topic] = channel.put_named
         return channel.put_named
 

@@ -7,7 +7,7 @@ and unpacking a tuple, a fifth of the whole call. Only names of the channel tabl
 interrupt between two instructions can leave it inconsistent.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, NoReturn, TypeAlias
 
@@ -16,6 +16,8 @@ from seamlog.messages import CDR_HEADER_INT, PRIMITIVES, Layout, split_array
 from .ring import HEAD
 
 Put: TypeAlias = Callable[..., bool]
+PutNamed: TypeAlias = Callable[[int, Mapping[str, Any]], bool]
+"""From stamp and fields by name; `TypeError` for fields that are not the topic's."""
 Stop: TypeAlias = Callable[[], None]
 
 _SEQUENCES = 1 << 32
@@ -50,11 +52,26 @@ def make(pack_into, data, words, slots, stride, now, anchor, owner, gate):
         words[{head}] = number
         return True
 
+    def put_named(stamp_ns, fields):
+        nonlocal number
+        if number >= limit or len(fields) != {count} or get_ident() != owner:
+            return put(stamp_ns, **fields)
+        try:
+            pack_into(
+                data, number % slots * stride, number + gaps, now() + anchor, stamp_ns,
+                {cdr_header}, stamp_ns, {packed_by_name}
+            )
+        except Exception:
+            return put(stamp_ns, **fields)
+        number += 1
+        words[{head}] = number
+        return True
+
     def stop():
         nonlocal limit
         limit = -1
 
-    return put, stop
+    return put, put_named, stop
 """
 
 
@@ -78,8 +95,8 @@ def parameter_names(layout: Layout) -> list[str]:
 
 
 @cache
-def put_maker(layout: Layout) -> Callable[..., tuple[Put, Stop]]:
-    """The function that makes `put(stamp_ns, *values)` and what ends it, over one ring."""
+def put_maker(layout: Layout) -> Callable[..., tuple[Put, PutNamed, Stop]]:
+    """The function that makes both ways to put, and what ends them, over one ring."""
     from threading import get_ident
 
     names = parameter_names(layout)
@@ -87,7 +104,11 @@ def put_maker(layout: Layout) -> Callable[..., tuple[Put, Stop]]:
     text = _SOURCE.format(
         parameters=", ".join(f"{name}=MISSING" for name in names),
         names=", ".join(names),
+        count=len(names),
         packed=", ".join(_packed(name, kinds.get(name, "")) for name in names),
+        packed_by_name=", ".join(
+            _packed(f"fields[{name!r}]", kinds.get(name, "")) for name in names
+        ),
         cdr_header=CDR_HEADER_INT,
         sequences=_SEQUENCES,
         head=HEAD,
@@ -98,7 +119,7 @@ def put_maker(layout: Layout) -> Callable[..., tuple[Put, Stop]]:
         "BOOLS": {False: False, True: True},
     }
     exec(text, space)
-    found: Callable[..., tuple[Put, Stop]] = space["make"]
+    found: Callable[..., tuple[Put, PutNamed, Stop]] = space["make"]
     return found
 
 

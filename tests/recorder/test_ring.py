@@ -52,6 +52,7 @@ def finish(path: Path, file: SessionFile, feed: Feed) -> None:
     assert file.finish() == []
 
 
+FIELDS = {"position_m": 0.0, "velocity_m_s": 0.0}
 actions = st.lists(st.one_of(st.integers(1, 12), st.just(0), st.just(-1)), max_size=40)
 """n > 0: put n messages; 0: take what is there; -1: put one that is not valid."""
 
@@ -63,7 +64,8 @@ def test_fixed_ring_behaves_as_a_bounded_queue(steps: list[int]) -> None:
         form = layout("/table/encoder")
         ring = fixed_ring(path.with_suffix(".ring"), CHANNEL_ID, form, SLOTS * STRIDE)
         assert (ring.slots, ring.stride) == (SLOTS, STRIDE)
-        put, _ = fixed_put(ring, make_gate("/table/encoder", ring), form, SimulatedClock())
+        gate = make_gate("/table/encoder", ring)
+        put, put_named, _ = fixed_put(ring, gate, form, SimulatedClock())
         feed = FixedFeed(CHANNEL_ID, "/table/encoder", "main", open_ring(ring_path(path)), file)
         queue: deque[int] = deque()
         kept, offered, refused = [], 0, 0
@@ -73,12 +75,16 @@ def test_fixed_ring_behaves_as_a_bounded_queue(steps: list[int]) -> None:
                 kept += list(queue)
                 queue.clear()
             elif step == -1:
-                assert not put(-5, 0.0, 0.0)
+                assert not (put(-5, 0.0, 0.0) if offered % 2 else put_named(-5, FIELDS))
                 # A full ring drops unseen, and the number that it would have had is used up.
                 refused += len(queue) < SLOTS
                 offered += len(queue) == SLOTS
             for _ in range(max(step, 0)):
-                accepted = put(offered, offered * 0.5, 0.0)
+                if offered % 2:
+                    accepted = put(offered, offered * 0.5, 0.0)
+                else:
+                    fields = {"velocity_m_s": 0.0, "position_m": offered * 0.5}
+                    accepted = put_named(offered, fields)
                 assert accepted == (len(queue) < SLOTS)
                 if accepted:
                     queue.append(offered)
@@ -156,7 +162,8 @@ def test_a_damaged_slot_is_lost_and_counted_and_the_rest_is_kept(tmp_path: Path)
     with open_session_file("/table/encoder") as (path, file):
         form = layout("/table/encoder")
         ring = fixed_ring(ring_path(path), CHANNEL_ID, form)
-        put, _ = fixed_put(ring, make_gate("/table/encoder", ring), form, SimulatedClock())
+        gate = make_gate("/table/encoder", ring)
+        put, _, _ = fixed_put(ring, gate, form, SimulatedClock())
         feed = FixedFeed(CHANNEL_ID, "/table/encoder", "main", open_ring(ring_path(path)), file)
         for i in range(10):
             put(i, 0.0, 0.0)
