@@ -27,6 +27,7 @@ def main(arguments: list[str]) -> None:
     """Record until the loop closes the recording or dies."""
     for ignored in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(ignored, signal.SIG_IGN)
+    _stand_aside()
     folder = Path(arguments[0])
     partial, pipe, loop = (int(text) for text in arguments[1:])
     os.set_blocking(sys.stdout.fileno(), False)
@@ -38,6 +39,17 @@ def main(arguments: list[str]) -> None:
     with suppress(OSError):
         sys.stdout.write(json.dumps(document) + "\n")
         sys.stdout.flush()
+
+
+def _stand_aside() -> None:
+    """Inherit neither the priority of the loop nor the processors that it claims for itself."""
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        os.setpriority(os.PRIO_PROCESS, 0, max(0, os.getpriority(os.PRIO_PROCESS, 0)))
+    if others := set(range(os.cpu_count() or 1)) - os.sched_getaffinity(0):
+        # Where it may not run on those, it stays with the loop.
+        with suppress(OSError):
+            os.sched_setaffinity(0, others)
 
 
 def _say(said: Mapping[str, str]) -> None:

@@ -135,7 +135,7 @@ def _take_items(folder: Path, file: RecoveredFile) -> Iterator[Feed]:
             yield _feed(folder, item, file)
         elif item["kind"] == "metadata":
             file.add_metadata(item["name"], item["values"])
-        elif (folder / item["data"]).exists():
+        elif item["kind"] == "attachment" and (folder / item["data"]).exists():
             # A file that is gone has been written, and with it its item.
             data = (folder / item["data"]).read_bytes()
             file.attach(item["name"], data, item["media_type"], item["log_time_ns"])

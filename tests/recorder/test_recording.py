@@ -234,3 +234,27 @@ def test_status_runs_along(path: Path) -> None:
         assert (account.accepted, account.written, account.waiting) == (1, 1, 0)
         assert recorder.status().is_recording
     assert not recorder.status().is_recording
+
+
+def test_the_recorder_process_stays_away_from_a_loop_that_claims_a_processor(
+    tmp_path: Path,
+) -> None:
+    script = (
+        "import os, sys\n"
+        "from contextlib import suppress\n"
+        "from seamlog.recorder import Recorder\n"
+        "os.sched_setaffinity(0, {int(sys.argv[2])})\n"
+        "with suppress(PermissionError):\n"
+        "    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))\n"
+        "with Recorder(sys.argv[1]) as recorder:\n"
+        "    pid = recorder.recorder_pid\n"
+        "    print(os.sched_getscheduler(pid), *os.sched_getaffinity(pid))\n"
+    )
+    own, *others = sorted(os.sched_getaffinity(0))
+    if not others:
+        pytest.skip("one processor has no other")
+    command = [sys.executable, "-c", script, str(tmp_path / "weld.mcap"), str(own)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=60)
+    policy, *processors = map(int, done.stdout.split())
+    assert policy == os.SCHED_OTHER
+    assert own not in processors

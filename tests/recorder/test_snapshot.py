@@ -15,9 +15,10 @@ from seamlog.clock import SimulatedClock
 from seamlog.errors import UsageError
 from seamlog.messages import layout
 from seamlog.recorder import Recorder, Snapshot, Status
+from seamlog.recorder.recovery import recover
 from seamlog.recorder.ring import RECORD
 from seamlog.recorder.trigger_rule import RuleWatch, parse_rule
-from tests.recorder.sessions import Read, read_session
+from tests.recorder.sessions import Read, final_accounts, read_session
 
 MS = 1_000_000
 START_NS = 1_767_225_600_000_000_000
@@ -180,6 +181,30 @@ os.kill(os.getpid(), 9)
     messages = read_session(path)
     assert stamps(messages) == list(range(500))
     assert any(b"snapshot: the loop died" in m.data for m in messages["/events"])
+
+
+def test_loop_and_recorder_killed_in_a_snapshot(tmp_path: Path) -> None:
+    script = """
+import os, sys, time
+from seamlog.recorder import Recorder, Snapshot
+recorder = Recorder(sys.argv[1], snapshot=Snapshot(before_s=60.0, after_s=60.0))
+encoder = recorder.channel("/table/encoder")
+for number in range(500):
+    encoder.put(number, 0.0, 0.0)
+    time.sleep(0.001)
+    if number == 200:
+        recorder.trigger("by hand")
+os.kill(recorder.recorder_pid, 9)
+os.kill(os.getpid(), 9)
+"""
+    path = tmp_path / "weld.mcap"
+    done = subprocess.run([sys.executable, "-c", script, str(path)], check=False, timeout=60)
+    assert done.returncode == -signal.SIGKILL
+    found = recover(path)
+    assert found.is_complete
+    assert stamps(read_session(path)) == list(range(500))
+    row = final_accounts(path)["/table/encoder"]
+    assert (row.accepted, row.written, row.lost) == (500, 500, 0)
 
 
 @pytest.mark.parametrize(
