@@ -11,7 +11,7 @@ import pytest
 
 from seamlog.recorder import folder as rings
 from tests.faults.shim import Faults, compile_shim
-from tests.faults.telling import ROWS, Tell, tell
+from tests.faults.telling import ROWS, Tell, table, tell
 
 
 @pytest.fixture(scope="session")
@@ -37,18 +37,6 @@ def no_rings_left(tmp_path: Path) -> Iterator[None]:
         with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
             if rings.read_recording(folder).path.startswith(f"{tmp_path}/"):
                 shutil.rmtree(folder, ignore_errors=True)
-
-
-def is_locked(folder: Path) -> bool:
-    """True while a process of the recording lives."""
-    import fcntl
-
-    with (folder / "lock").open("r+b") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            return True
-    return False
 
 
 def mounted(folder: Path, *arguments: str) -> Iterator[Path]:
@@ -82,5 +70,5 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """The figures of the long runs."""
     if ROWS:
         terminalreporter.section("figures of the fault programme")
-        for row in ROWS:
-            terminalreporter.write_line(row)
+        for line in table(ROWS):
+            terminalreporter.write_line(line)

@@ -1,13 +1,6 @@
-"""Fuzzing of decoders and importers: `python fuzz_decoders.py [libFuzzer options] CORPUS`.
+"""Decoders and importers to be fuzzed: the first byte of an input chooses what reads the rest."""
 
-The first byte of an input chooses what reads the rest. Whatever the bytes are, only errors of the
-one family come out.
-"""
-
-import logging
 import struct
-import sys
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -100,26 +93,6 @@ def attempt(read: Callable[[bytes], Any], data: bytes) -> None:
         read(data)
 
 
-def main() -> None:
-    """Run atheris on the module as it is instrumented."""
-    import atheris
-
-    logging.disable(logging.CRITICAL)
-    known = readers(Path(tempfile.mkdtemp()) / "fuzzed.bin")
-
-    def one(data: bytes) -> None:
-        if data:
-            attempt(known[data[0] % len(known)], data[1:])
-
-    atheris.instrument_all()
-    atheris.Setup(sys.argv, one)
-    atheris.Fuzz()
-
-
 def seeds(valid: dict[int, bytes]) -> list[bytes]:
     """Inputs that begin with what reads them."""
     return [struct.pack("B", number) + data for number, data in valid.items()]
-
-
-if __name__ == "__main__":
-    main()

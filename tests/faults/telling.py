@@ -1,18 +1,49 @@
-"""Figures of the long runs, printed at the end of `make soak`."""
+"""Figures of the long runs, printed as one table at the end of `make soak`."""
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 Tell = Callable[..., None]
-ROWS: list[str] = []
+_COMPARE = {"<=": operator.le, ">=": operator.ge}
 
 
-def tell(name: str, value: float, unit: str, target: str = "") -> None:
-    """Print `value` at the end; fail unless it keeps `target`, such as "<= 60"."""
-    kept = True
-    if target:
-        relation, bound = target.split()
-        compare = {"<=": operator.le, ">=": operator.ge}[relation]
-        kept = bool(compare(value, float(bound)))
-    ROWS.append(f"{name:<64} {value:>10.4g} {unit:<5} {target:<8} {'' if kept else 'MISSED'}")
-    assert kept, f"{name}: {value:.4g} {unit}, wanted {target}"
+class Row(NamedTuple):
+    """One figure: the fault, what was measured, what is promised."""
+
+    fault: str
+    what: str
+    value: float
+    unit: str
+    promise: str
+
+    @property
+    def is_kept(self) -> bool:
+        """The promise holds, or there is none."""
+        if not self.promise:
+            return True
+        relation, bound = self.promise.split()
+        return bool(_COMPARE[relation](self.value, float(bound)))
+
+
+ROWS: list[Row] = []
+
+
+def tell(fault: str, what: str, value: float, unit: str = "", promise: str = "") -> None:
+    """Print `value` at the end; fail unless it keeps `promise`, such as "<= 60"."""
+    row = Row(fault, what, value, unit, promise)
+    ROWS.append(row)
+    assert row.is_kept, f"{fault}: {what} {value:.4g} {unit}, promised {promise}"
+
+
+def table(rows: list[Row]) -> Iterator[str]:
+    """Lines of the table, faults one after the other."""
+    yield f"{'fault, and what was measured':<58} {'figure':>9} {'unit':<5} {'promise':<9}"
+    fault = ""
+    for row in rows:
+        if row.fault != fault:
+            fault = row.fault
+            yield fault
+        verdict = "" if not row.promise else "holds" if row.is_kept else "MISSED"
+        line = f"  {row.what:<56} {row.value:>9.4g} {row.unit:<5} {row.promise:<9} {verdict}"
+        yield line.rstrip()

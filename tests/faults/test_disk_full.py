@@ -25,8 +25,11 @@ def fill(folder: Path, leave: int) -> Path:
     return ballast
 
 
-def put_until_full(recorder: Recorder, accepted: list[int], seconds: float = 60.0) -> float:
-    """Put messages until the recorder says that the disk is full; returns when, monotonic."""
+def put_until_full(recorder: Recorder, accepted: list[int], seconds: float = 60.0) -> int:
+    """Put messages until the recorder says that the disk is full; returns when.
+
+    Stamps are monotonic time in nanoseconds, as what is returned.
+    """
     encoder = recorder.channel("/table/encoder")
     end = time.monotonic() + seconds
     number = 0
@@ -35,10 +38,11 @@ def put_until_full(recorder: Recorder, accepted: list[int], seconds: float = 60.
         for _ in range(50):
             number += 1
             # Values that zstd cannot shrink.
-            if encoder.put(number, (number * 0.7548776662) % 1, (number * 0.5698402910) % 1):
-                accepted.append(number)
+            stamp = time.monotonic_ns()
+            if encoder.put(stamp, (number * 0.7548776662) % 1, (number * 0.5698402910) % 1):
+                accepted.append(stamp)
         time.sleep(0.001)
-    return time.monotonic()
+    return time.monotonic_ns()
 
 
 def test_what_is_on_a_full_disk_is_a_whole_session(small_disk: Path) -> None:

@@ -1,10 +1,7 @@
 """Any bytes at all: reading, `doctor` and `recover` end in the one family of errors."""
 
 import logging
-import os
 import random
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,15 +10,14 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from tests.core.scenarios import write_foreign, write_live
+from tests.faults.fuzz import Edit, edited, fuzz
 from tests.faults.read_everything import try_all
+from tests.faults.telling import Tell
 
-FUZZER = Path(__file__).with_name("fuzz_reader.py")
-FUZZ_S, LONG = 240, 5000
-Edit = tuple[float, int, bytes]
+LONG = 5000
 EDITS = st.lists(
     st.tuples(st.floats(0, 1), st.integers(0, 24), st.binary(max_size=16)), min_size=1, max_size=6
 )
-"""Places from 0 to 1 of the file, bytes removed there, bytes put there."""
 
 
 @pytest.fixture(autouse=True)
@@ -38,13 +34,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     write_foreign(folder / "bag.mcap", {"chunk_size": 500}, 12)
     write_foreign(folder / "bare.mcap", {"use_chunking": False}, 6)
     return [path.read_bytes() for path in sorted(folder.iterdir())]
-
-
-def edited(data: bytes, edits: list[Edit]) -> bytes:
-    for place, removed, added in edits:
-        at = int(place * len(data))
-        data = data[:at] + added + data[at + removed :]
-    return data
 
 
 @settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck))
@@ -65,7 +54,7 @@ def test_bytes_behind_the_magic(tmp_path: Path, data: bytes) -> None:
 
 
 @pytest.mark.soak
-def test_many_edited_files(files: list[bytes], tmp_path: Path) -> None:
+def test_many_edited_files(files: list[bytes], tmp_path: Path, tell: Tell) -> None:
     path = tmp_path / "x.mcap"
     for seed in range(LONG):
         dice = random.Random(seed)
@@ -75,23 +64,9 @@ def test_many_edited_files(files: list[bytes], tmp_path: Path) -> None:
         ]
         path.write_bytes(edited(files[seed % 3], edits))
         try_all(path)
-    print(f"\n{LONG} edited files: every error of the family, with its file")
+    tell("files edited at random", "read, each error in the family, with the file", LONG)
 
 
 @pytest.mark.soak
-def test_guided_fuzzing(files: list[bytes], tmp_path: Path, project: Path) -> None:
-    pytest.importorskip("atheris")
-    corpus = tmp_path / "corpus"
-    corpus.mkdir()
-    for number, data in enumerate(files):
-        (corpus / str(number)).write_bytes(data)
-    command = [sys.executable, str(FUZZER), f"-max_total_time={FUZZ_S}", "-rss_limit_mb=1500"]
-    fuzzed = subprocess.run(
-        [*command, f"-artifact_prefix={tmp_path}/", str(corpus)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | {"PYTHONPATH": str(project)},
-    )
-    print("\n" + "\n".join(fuzzed.stderr.splitlines()[-3:]))
-    assert fuzzed.returncode == 0, fuzzed.stderr[-3000:]
+def test_guided_fuzzing(files: list[bytes], tmp_path: Path, project: Path, tell: Tell) -> None:
+    fuzz("reader", files, tmp_path, project, tell)

@@ -1,8 +1,5 @@
 """Any bytes at all in messages, definitions and foreign files: only errors of the one family."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +17,10 @@ from rosbags.typesys import Stores, get_typestore
 
 from tests.core.protobuf_schemas import everything
 from tests.core.test_protobuf import joints
+from tests.faults.fuzz import edited, fuzz
 from tests.faults.fuzz_decoders import GRAMMARS, TEXT, attempt, readers, seeds
+from tests.faults.telling import Tell
 
-FUZZER = Path(__file__).with_name("fuzz_decoders.py")
-FUZZ_S = 240
 EDITS = st.lists(
     st.tuples(st.floats(0, 1), st.integers(0, 9), st.binary(max_size=9)), min_size=1, max_size=4
 )
@@ -74,13 +71,6 @@ def bag2(path: Path) -> bytes:
     return next(path.glob("*.db3")).read_bytes()
 
 
-def edited(data: bytes, edits: list[tuple[float, int, bytes]]) -> bytes:
-    for place, removed, added in edits:
-        at = int(place * len(data))
-        data = data[:at] + added + data[at + removed :]
-    return data
-
-
 def test_valid_inputs_are_read(valid: dict[int, bytes], tmp_path: Path) -> None:
     known = readers(tmp_path / "x.bin")
     assert len(known) == len(valid) == 2 * len(GRAMMARS) + 9
@@ -101,19 +91,7 @@ def test_any_bytes(tmp_path: Path, which: int, data: bytes) -> None:
 
 
 @pytest.mark.soak
-def test_guided_fuzzing_of_decoders(valid: dict[int, bytes], tmp_path: Path, project: Path) -> None:
-    pytest.importorskip("atheris")
-    corpus = tmp_path / "corpus"
-    corpus.mkdir()
-    for number, data in enumerate(seeds(valid)):
-        (corpus / str(number)).write_bytes(data)
-    command = [sys.executable, str(FUZZER), f"-max_total_time={FUZZ_S}", "-rss_limit_mb=2500"]
-    fuzzed = subprocess.run(
-        [*command, f"-artifact_prefix={tmp_path}/", str(corpus)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | {"PYTHONPATH": str(project)},
-    )
-    print("\n" + "\n".join(fuzzed.stderr.splitlines()[-3:]))
-    assert fuzzed.returncode == 0, fuzzed.stderr[-4000:]
+def test_guided_fuzzing_of_decoders(
+    valid: dict[int, bytes], tmp_path: Path, project: Path, tell: Tell
+) -> None:
+    fuzz("decoders", seeds(valid), tmp_path, project, tell)

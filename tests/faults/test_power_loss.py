@@ -110,9 +110,9 @@ def test_an_arc_off_is_durable_at_once(disk: Disk) -> None:
 def test_losses_of_power(disk: Disk, tell: Tell) -> None:
     random_s = random.Random(1)
     losses = [Loss(disk, f"weld{n}", random_s.uniform(0.3, 3.0), "default") for n in range(25)]
-    name = f"loss of power, {len(losses)} times on {_kind(disk)}"
-    tell(f"{name}: durable messages lost", sum(row.durable_lost for row in losses), "", "<= 0")
-    tell(f"{name}: accepted lost, most", max(row.lost_ms for row in losses), "ms", "<= 400")
+    fault = f"loss of power, {len(losses)} times on {_kind(disk)}"
+    tell(fault, "durable messages lost", sum(row.durable_lost for row in losses), "", "<= 0")
+    tell(fault, "accepted lost, most", max(row.lost_ms for row in losses), "ms", "<= 400")
 
 
 def _kind(disk: Disk) -> str:

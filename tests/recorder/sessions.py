@@ -73,3 +73,24 @@ def parse_status(data: bytes) -> StatusRow:
     topic = data[16 : 16 + size - 1].decode()
     at = 4 + -(-(12 + size) // 8) * 8
     return StatusRow(topic, *struct.unpack_from("<6Q", data, at))
+
+
+def assert_all_there(session: Path, accepted: Mapping[str, int]) -> None:
+    """All that was accepted is in the session once, in order, and its accounts say so.
+
+    Of each topic one more may have been accepted whose count was not noted any more.
+    """
+    messages, accounts = read_session(session), final_accounts(session)
+    for topic, count in accepted.items():
+        found = messages.get(topic, [])
+        numbers = [message.sequence for message in found]
+        assert numbers in (list(range(count)), list(range(count + 1))), topic
+        stamps = [message.publish_time_ns for message in found]
+        assert stamps == sorted(set(stamps))
+        row = accounts[topic]
+        assert row.offered == row.accepted + row.dropped + row.refused
+        assert row.accepted == row.written + row.lost == len(found)
+        assert (row.lost, row.dropped, row.refused) == (0, 0, 0)
+        steps = [message.values[0] for message in found if message.values]
+        assert steps in ([], numbers)
+    assert read_attachments(session)["wps/a.txt"] == ("text/plain", b"procedure")

@@ -3,11 +3,7 @@
 import os
 import random
 import signal
-import struct
-import subprocess
-import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,33 +12,11 @@ import pytest
 from seamlog import open_session
 from seamlog.recorder import Recorder
 from seamlog.recorder.folder import root
-from tests.recorder.sessions import final_accounts, read_metadata, read_session
+from tests.faults.accounts import ring_stamps, unfinished_stamps
+from tests.recorder.live_loop import LiveLoop, wait_for
+from tests.recorder.sessions import assert_all_there, read_metadata
 
-LOOP = Path(__file__).with_name("killed_loop.py")
 KILLS = 20
-
-
-def wait_for(condition: Callable[[], bool], seconds: float = 30.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "nothing happened"
-        time.sleep(0.01)
-
-
-def start_loop(session: Path, counters: Path) -> subprocess.Popen[str]:
-    counters.write_bytes(bytes(16))
-    command = [sys.executable, str(LOOP), str(session), str(counters)]
-    loop = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    assert loop.stdout is not None
-    assert loop.stdout.readline() == "ready\n"
-    return loop
-
-
-def kill(loop: subprocess.Popen[str]) -> None:
-    loop.kill()
-    assert loop.stdout is not None
-    loop.stdout.close()
-    loop.wait()
 
 
 @pytest.mark.parametrize("seed", range(KILLS))
@@ -50,34 +24,14 @@ def test_a_killed_loop_loses_nothing_that_was_accepted(tmp_path: Path, seed: int
     kill_and_check(tmp_path, seed)
 
 
-def kill_and_check(where: Path, seed: int) -> None:
-    session, counters = where / "weld.mcap", where / "counters"
-    loop = start_loop(session, counters)
+def kill_and_check(folder: Path, seed: int) -> None:
+    loop = LiveLoop(folder)
     time.sleep(random.Random(seed).uniform(0.0, 0.9))
-    kill(loop)
-    wait_for(session.exists)
-    accepted = dict(
-        zip(
-            ("/table/encoder", "/camera/image"),
-            struct.unpack("<2Q", counters.read_bytes()),
-            strict=True,
-        )
-    )
-    messages, accounts = read_session(session), final_accounts(session)
-    for topic, count in accepted.items():
-        stamps = [message.publish_time_ns for message in messages.get(topic, [])]
-        # One more may have been accepted just before the kill, its count not yet noted.
-        assert stamps in (list(range(count)), list(range(count + 1))), topic
-        row = accounts[topic]
-        assert row.offered == row.accepted + row.dropped + row.refused
-        assert row.accepted == row.written + row.lost == len(stamps)
-        assert (row.lost, row.dropped) == (0, 0)
-    assert [m.values[0] for m in messages.get("/table/encoder", [])] == [
-        float(m.publish_time_ns) for m in messages.get("/table/encoder", [])
-    ]
-    assert read_metadata(session)["seamlog.recording.end"] == {"ending": "the loop died"}
-    folder = root() / read_metadata(session)["seamlog.recording"]["id"]
-    wait_for(lambda: not folder.exists())
+    loop.process.kill()
+    loop.await_end()
+    assert_all_there(loop.session, loop.accepted)
+    assert read_metadata(loop.session)["seamlog.recording.end"] == {"ending": "the loop died"}
+    wait_for(lambda: not loop.rings.exists())
 
 
 def test_the_loop_goes_on_without_its_recorder_process(tmp_path: Path) -> None:
@@ -107,6 +61,22 @@ def test_the_loop_goes_on_without_its_recorder_process(tmp_path: Path) -> None:
     for path in folder.iterdir():
         path.unlink()
     folder.rmdir()
+
+
+def test_only_the_recorder_killed(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "weld.mcap")
+    put = recorder.channel("/table/encoder").put
+    accepted = []
+    for number in range(600):
+        if number == 400:
+            os.kill(recorder.recorder_pid, signal.SIGKILL)
+        if put(number, 0.0, 0.0):
+            accepted.append(number)
+        time.sleep(0.001)
+    recorder.close()
+    in_file = unfinished_stamps(tmp_path / "weld.mcap.part", "/table/encoder")
+    in_rings = ring_stamps(root() / recorder.id)["/table/encoder"]
+    assert sorted({*in_file, *in_rings}) == accepted == list(range(600))
 
 
 def test_a_simulated_loop_does_not_wait_for_a_dead_recorder(tmp_path: Path) -> None:
