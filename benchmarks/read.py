@@ -247,121 +247,152 @@ builtin_interfaces/Time stamp
 string frame_id
 """
 JOINTS = ("axis_x", "table", "z", "torch_tilt")
+QUANTITIES = {"cdr": ("position", "velocity", "effort")}
+QUANTITIES["protobuf"] = ("position", "velocity", "acceleration", "effort")
 
 
-def write_foreign(path: Path, encoding: str, count: int) -> Values:
-    """Joint states of one to four joints by the mcap package; positions of the first joint."""
+def joint_values(count: int) -> Iterator[tuple[int, int, Values]]:
+    """Time, how many joints, and their values (quantity by joint), message by message."""
+    values = np.random.default_rng(2).normal(size=(count, 4, len(JOINTS)))
+    for place in range(count):
+        yield START_NS + place * 1_000_003, 1 + place % len(JOINTS), values[place]
+
+
+def write_cdr(path: Path, count: int) -> None:
+    """sensor_msgs/msg/JointState of ROS 2 by the mcap package."""
     from mcap.writer import Writer
 
-    encode, schema = ENCODERS[encoding]()
-    values = np.random.default_rng(2).normal(size=(count, 3, len(JOINTS)))
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start()
-        channel = writer.register_channel("/joints", encoding, writer.register_schema(*schema))
-        for place in range(count):
-            joints = 1 + place % len(JOINTS)
-            time = START_NS + place * 1_000_003
-            payload = encode(time, joints, values[place])
-            writer.add_message(channel, time, payload, time)
+        schema = ("sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE.encode())
+        channel = writer.register_channel("/joints", "cdr", writer.register_schema(*schema))
+        for time, joints, values in joint_values(count):
+            message = CdrWriter()
+            message.put("int32", time // 10**9)
+            message.put("uint32", time % 10**9)
+            message.put("string", "base")
+            message.put("string[]", JOINTS[:joints])
+            for row in values[:3]:
+                message.put("float64[]", row[:joints].tolist())
+            writer.add_message(channel, time, message.payload(), time)
         writer.finish()
-    return values[:, 0, 0]
 
 
-def cdr_encoder() -> tuple[Callable[..., bytes], tuple[str, str, bytes]]:
-    """sensor_msgs/msg/JointState of ROS 2."""
+def write_protobuf(path: Path, count: int) -> None:
+    """foxglove.JointStates by foxglove-sdk."""
+    import foxglove
+    from foxglove.channels import JointStatesChannel
+    from foxglove.messages import JointState, JointStates, Timestamp
 
-    def encode(time: int, joints: int, values: Values) -> bytes:
-        message = CdrWriter()
-        message.put("int32", time // 10**9)
-        message.put("uint32", time % 10**9)
-        message.put("string", "base")
-        message.put("string[]", JOINTS[:joints])
-        for row in values:
-            message.put("float64[]", row[:joints].tolist())
-        return message.payload()
+    context = foxglove.Context()
+    with foxglove.open_mcap(path, context=context):
+        channel = JointStatesChannel("/joints", context=context)
+        for time, joints, values in joint_values(count):
+            rows = zip(JOINTS, values.T[:joints].tolist(), strict=False)
+            states = [
+                JointState(name=name, position=x, velocity=v, acceleration=a, effort=e)
+                for name, (x, v, a, e) in rows
+            ]
+            stamp = Timestamp(sec=time // 10**9, nsec=time % 10**9)
+            channel.log(JointStates(timestamp=stamp, joints=states), log_time=time)
 
-    return encode, ("sensor_msgs/msg/JointState", "ros2msg", JOINT_STATE.encode())
+
+def first_of_cdr(message: Any) -> tuple[Any, ...]:
+    """The first joint."""
+    return message.position[0], message.velocity[0], message.effort[0]
 
 
-def protobuf_encoder() -> tuple[Callable[..., bytes], tuple[str, str, bytes]]:
-    """A time stamp and repeated joints, as foxglove.JointStates."""
-    from google.protobuf import descriptor_pb2, timestamp_pb2
-    from google.protobuf.descriptor_pool import Default
-    from google.protobuf.message_factory import GetMessageClass
+def all_of_cdr(message: Any) -> tuple[Any, ...]:
+    """Every field, sequences as arrays as ours come."""
+    numbers = (np.array(getattr(message, name)) for name in QUANTITIES["cdr"])
+    stamp = message.header.stamp
+    return stamp.sec, stamp.nanosec, message.header.frame_id, list(message.name), *numbers
 
-    file = descriptor_pb2.FileDescriptorProto(name="joints.proto", package="b", syntax="proto3")
-    file.dependency.append("google/protobuf/timestamp.proto")
-    joint = file.message_type.add(name="Joint")
-    joint.field.add(name="name", number=1, type=9, label=1)
-    for number, name in enumerate(("position", "velocity", "effort"), 2):
-        joint.field.add(name=name, number=number, type=1, label=1)
-    states = file.message_type.add(name="Joints")
-    states.field.add(
-        name="timestamp", number=1, type=11, label=1, type_name=".google.protobuf.Timestamp"
+
+def first_of_protobuf(message: Any) -> tuple[Any, ...]:
+    """The first joint."""
+    joint = message.joints[0]
+    return joint.position, joint.velocity, joint.acceleration, joint.effort
+
+
+def all_of_protobuf(message: Any) -> tuple[Any, ...]:
+    """Every field, what repeats as arrays as ours come."""
+    joints, stamp = message.joints, message.timestamp
+    numbers = (
+        np.array([getattr(joint, name) for joint in joints]) for name in QUANTITIES["protobuf"]
     )
-    states.field.add(name="joints", number=2, type=11, label=3, type_name=".b.Joint")
-    files = descriptor_pb2.FileDescriptorSet(file=[file])
-    timestamp_pb2.DESCRIPTOR.CopyToProto(files.file.add())
-    Default().Add(file)
-    make = GetMessageClass(Default().FindMessageTypeByName("b.Joints"))
-
-    def encode(time: int, joints: int, values: Values) -> bytes:
-        message = make()
-        message.timestamp.FromNanoseconds(time)
-        for name, column in zip(JOINTS[:joints], values.T, strict=False):
-            message.joints.add(name=name, position=column[0], velocity=column[1], effort=column[2])
-        return bytes(message.SerializeToString())
-
-    return encode, ("b.Joints", "protobuf", files.SerializeToString())
+    return stamp.seconds, stamp.nanos, [joint.name for joint in joints], *numbers
 
 
-ENCODERS = {"cdr": cdr_encoder, "protobuf": protobuf_encoder}
-FIRST_JOINT = {
-    "cdr": ["position[0]", "velocity[0]", "effort[0]"],
-    "protobuf": ["joints[0].position", "joints[0].velocity", "joints[0].effort"],
+ALL_FIELDS = {
+    "cdr": ["header.stamp.sec", "header.stamp.nanosec", "header.frame_id", "name"],
+    "protobuf": ["timestamp.seconds", "timestamp.nanos", "joints.name"],
 }
+FIRST_JOINT = {"cdr": "{}[0]", "protobuf": "joints[0].{}"}
+EVERY_JOINT = {"cdr": "{}", "protobuf": "joints.{}"}
 
 
 def foreign(folder: Path, count: int) -> Iterator[Figure]:
-    """Messages of varying length: the first joint, and every field."""
-    with optional_peer("mcap-ros2-support, mcap-protobuf-support"):
+    """Messages of varying length: the first joint, and every field.
+
+    Ours come in the order of log time; mcap sorts by it unless it is told to keep the file's order.
+    """
+    with optional_peer("mcap-ros2-support, mcap-protobuf-support, foxglove-sdk"):
         from mcap_protobuf.decoder import DecoderFactory as Protobuf
         from mcap_ros2.decoder import DecoderFactory as Ros2
 
-        for encoding, fields in FIRST_JOINT.items():
+        cdr = ("cdr", write_cdr, first_of_cdr, all_of_cdr)
+        protobuf = ("protobuf", write_protobuf, first_of_protobuf, all_of_protobuf)
+        for encoding, write_file, first, whole in (cdr, protobuf):
             path, few = folder / f"{encoding}.mcap", folder / f"{encoding}_few.mcap"
-            wanted = write_foreign(path, encoding, count)
-            write_foreign(few, encoding, count // 10)
-            peer = cpu_s(lambda p=few: decoded(p, [Ros2(), Protobuf()]), 2) / (count // 10)
-            same(columns_of(path, fields)[fields[0]], wanted)
-            same(decoded(few, [Ros2(), Protobuf()])[:, 0], columns_of(few, fields)[fields[0]])
-            for name, picked in (("first joint", fields), ("all fields", None)):
-                own = cpu_s(lambda p=path, f=picked: columns_of(p, f)) / count
-                target = ">= 50" if picked else ""
-                yield Figure(f"varying {encoding}, {name}: mcap / ours", peer / own, "x", target)
+            write_file(path, count)
+            write_file(few, count // 10)
+            names = QUANTITIES[encoding]
+            picked = [FIRST_JOINT[encoding].format(name) for name in names]
+            fields = [*ALL_FIELDS[encoding], *(EVERY_JOINT[encoding].format(n) for n in names)]
+            for told, wanted, pick in (("first joint", picked, first), ("all", fields, whole)):
+                name, target = f"varying {encoding}, {told}", ">= 50" if pick is first else ""
+                agree(columns_of(few, wanted), wanted, decoded(few, pick, Ros2, Protobuf))
+                own = cpu_s(lambda p=path, f=wanted: columns_of(p, f)) / count
+                peer = (count // 10, few, pick, Ros2, Protobuf)
+                yield Figure(f"{name}: mcap / ours", peer_s(False, *peer) / own, "x", target)
+                yield Figure(f"{name}: mcap by time / ours", peer_s(True, *peer) / own, "x")
+            ratio = peer_s(False, count // 10, few, first, Ros2, Protobuf)
+            ratio /= cpu_s(least_work(path)) / count
+            yield Figure(f"varying {encoding}: mcap / (decompression + crc32)", ratio, "x")
 
 
-def columns_of(path: Path, fields: list[str] | None) -> dict[str, Values]:
+def peer_s(
+    by_time: bool, count: int, path: Path, pick: Callable[..., Any], *factories: Any
+) -> float:
+    """Seconds a message."""
+    return cpu_s(lambda: decoded(path, pick, *factories, by_time=by_time), 3) / count
+
+
+def columns_of(path: Path, fields: list[str]) -> dict[str, Values]:
     """Columns of the joint states."""
     with seamlog.open_session(path) as session:
         return session.columns("/joints", fields)
 
 
-def decoded(path: Path, factories: list[Any]) -> Values:
-    """The first joint of every message, decoded by mcap in file order, CRC checked."""
+def decoded(
+    path: Path, pick: Callable[..., Any], *factories: Any, by_time: bool = False
+) -> list[tuple[Any, ...]]:
+    """What `pick` takes out of every message, decoded by mcap, CRC checked."""
     with path.open("rb") as file:
-        reader = make_reader(file, validate_crcs=True, decoder_factories=factories)
-        items = reader.iter_decoded_messages(["/joints"], log_time_order=False)
-        return np.array([first_joint(item.decoded_message) for item in items])
+        made = [factory() for factory in factories]
+        reader = make_reader(file, validate_crcs=True, decoder_factories=made)
+        items = reader.iter_decoded_messages(["/joints"], log_time_order=by_time)
+        return [pick(item.decoded_message) for item in items]
 
 
-def first_joint(message: Any) -> tuple[float, float, float]:
-    """Position, velocity and effort."""
-    if hasattr(message, "joints"):
-        joint = message.joints[0]
-        return joint.position, joint.velocity, joint.effort
-    return message.position[0], message.velocity[0], message.effort[0]
+def agree(columns: dict[str, Values], fields: list[str], rows: list[tuple[Any, ...]]) -> None:
+    """Every field of every message must be the same."""
+    for field, wanted in zip(fields, zip(*rows, strict=True), strict=True):
+        pairs = zip(columns[field], wanted, strict=True)
+        if not all(np.array_equal(one, other) for one, other in pairs):
+            raise SystemExit(f"two readers disagree about {field}")
 
 
 def opening(folder: Path) -> Iterator[Figure]:

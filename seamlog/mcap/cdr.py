@@ -14,21 +14,20 @@ from seamlog.mcap import cdr_walk
 from seamlog.mcap.cdr_walk import Cursors
 from seamlog.mcap.records import Malformed
 from seamlog.mcap.ros2msg import SEQUENCE, Node
-from seamlog.mcap.rows import PAYLOAD, Batch, Rows
+from seamlog.mcap.rows import PAYLOAD, Batch, Rows, taken
 from seamlog.mcap.shapes import (
     Form,
     Forms,
     Leaf,
     Shape,
     Structure,
+    Text,
     empty_leaf,
     first_payload,
     numbers_leaf,
     read_number,
-    read_text,
     sequence_of,
     stacked_leaf,
-    texts_leaf,
 )
 from seamlog.messages import PRIMITIVES
 
@@ -111,7 +110,7 @@ class CdrGrammar:
                 Cursors(batch.data, starts, starts.copy(), ends, "<", self._dialect), names
             )
         found: dict[str, NDArray[Any]] = {}
-        heads = np.lib.stride_tricks.sliding_window_view(batch.data, 2)[starts].view(">u2").ravel()
+        heads = taken(batch.data, starts, ">u2")
         for head in np.unique(heads).tolist():
             here = np.flatnonzero(heads == head)
             begun = starts[here] + header
@@ -187,15 +186,15 @@ class _Walker:
             return numbers_leaf(name, at, form, count or 0)
         return Leaf(name, read_number(at, form, count))
 
-    def _one_text(self) -> tuple[int, int]:
+    def _one_text(self) -> Text:
         size = self._count()
-        return self._step(size), max(size - self._dialect.terminator, 0)
+        return Text(self._step(size), max(size - self._dialect.terminator, 0))
 
     def _text(self, name: str, node: Node) -> Leaf:
         if node.count is None:
-            return Leaf(name, read_text(*self._one_text()))
+            return Leaf(name, self._one_text())
         count = self._bounded(self._count() if node.count == SEQUENCE else node.count, 4)
-        return texts_leaf(name, [self._one_text() for _ in range(count)])
+        return stacked_leaf(name, [self._one_text() for _ in range(count)])
 
     def _records(self, name: str, fields: tuple[Node, ...], node: Node) -> Iterator[Leaf]:
         count = self._count() if node.count == SEQUENCE else node.count

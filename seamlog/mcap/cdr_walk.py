@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from seamlog.mcap.records import Malformed
 from seamlog.mcap.ros2msg import SEQUENCE, Node
+from seamlog.mcap.rows import taken
 from seamlog.mcap.shapes import Form, empty_of, objects, texts
 from seamlog.messages import PRIMITIVES
 
@@ -74,11 +75,7 @@ class Cursors:
         """One number of each message."""
         self.align(width)
         begun = self.step(width)
-        if not len(begun):
-            return np.empty(0, form)
-        windows = np.lib.stride_tricks.sliding_window_view(self.data, width)
-        values: NDArray[Any] = windows[begun].view(form).ravel()
-        return values
+        return taken(self.data, begun, form)
 
     def counts(self) -> Integers:
         """The next count of each message, a plausible one."""

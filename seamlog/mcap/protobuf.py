@@ -36,13 +36,13 @@ from seamlog.mcap.shapes import (
     Read,
     Shape,
     Structure,
+    Text,
     constant,
     empty_leaf,
     first_payload,
     numbers_leaf,
     objects,
     read_number,
-    read_text,
     stacked_leaf,
 )
 
@@ -176,7 +176,8 @@ class _Walker:
             if (end - start) % width:
                 raise Malformed(f"field {field.name} is no whole number of values")
             return numbers_leaf(name, start, field.form, (end - start) // width)
-        return stacked_leaf(name, [x for part in found for x in self._elements(field, *part)])
+        elements = [x for part in found for x in self._elements(field, *part)]
+        return stacked_leaf(name, elements) if elements else empty_leaf(name, Form(field.form))
 
     def _elements(self, field: Field, wire: int, start: int, end: int) -> Iterator[Read]:
         if wire == field.wire:
@@ -209,19 +210,42 @@ def _absent_leaf(field: Field) -> Leaf:
 
 
 def _read_varint(rows: Rows, at: int, size: int, field: Field) -> NDArray[Any]:
-    raw = rows.column(at, "u1", size)
-    value = (raw[:, 0] & np.uint8(0x7F)).astype(np.uint64)
-    for place in range(1, size):
-        part = (raw[:, place] & np.uint8(0x7F)).astype(np.uint64)
-        value |= part << np.uint64(7 * place)
+    value = _joined(rows, at, min(size, 8))
+    if size > 8:
+        value = value | _joined(rows, at + 8, size - 8) << np.uint64(56)
     if field.is_zigzag:
         value = (value >> np.uint64(1)) ^ (np.uint64(0) - (value & np.uint64(1)))
     return value != 0 if field.form == "?" else value.astype(field.form)
 
 
+_STEPS = (
+    (1, 0x007F007F007F007F),
+    (2, 0x00003FFF00003FFF),
+    (4, 0x000000000FFFFFFF),
+)
+"""Neighbours joined at each step: bytes of 7 bits, pairs of 14, fours of 28."""
+
+
+def _joined(rows: Rows, at: int, size: int) -> NDArray[np.uint64]:
+    """The low 7 bits of each of `size` (at most 8) bytes, as one number a row.
+
+    The word that ends with them is read; it may begin in the record's head.
+    """
+    if size == 1:
+        return (rows.column(at, "u1") & np.uint8(0x7F)).astype(np.uint64)
+    value = rows.column(at + size - 8, "<u8") >> np.uint64(64 - 8 * size)
+    value &= np.uint64(0x7F7F7F7F7F7F7F7F)
+    for step, low in _STEPS[: (size - 1).bit_length()]:
+        high = value & np.uint64(low << 8 * step)
+        high >>= np.uint64(step)
+        value &= np.uint64(low)
+        value |= high
+    return value
+
+
 def _read_bytes(field: Field, start: int, end: int) -> Read:
     if field.is_text:
-        return read_text(start, end - start)
+        return Text(start, end - start)
     make = partial(to_dict, field.recursive) if field.recursive else bytes
 
     def read(rows: Rows) -> NDArray[Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from seamlog.mcap import records
 from seamlog.mcap.records import Malformed
@@ -17,6 +17,9 @@ PAYLOAD = 31
 """Bytes of a Message record in front of its payload."""
 _HEAD = records.RECORD_HEAD
 _JOIN_BYTES = 1 << 20
+_MERGE_BYTES = 4 << 20
+_START = np.dtype([("opcode", "u1"), ("length", "<u8"), ("channel", "<u2")])
+"""How a Message record begins."""
 Places: TypeAlias = tuple[NDArray[np.int64], NDArray[np.int64]]
 """Offsets and whole lengths of messages."""
 
@@ -47,8 +50,10 @@ class Rows:
 
     def select(self, chosen: NDArray[np.bool_]) -> "Rows":
         """The chosen records, copied."""
-        whole = self.column(-PAYLOAD, "u1", self.length)[chosen]
-        return Rows(whole.reshape(-1), 0, self.length, len(whole), self.length)
+        whole = np.ndarray((self.count,), f"V{self.length}", self.data, self.start, (self.stride,))[
+            chosen
+        ]
+        return Rows(whole.view(np.uint8), 0, self.length, len(whole), self.length)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,18 +123,45 @@ class Batch:
         if self.uniform:
             return self.uniform.column(at - PAYLOAD, form)
         kind = np.dtype(form)
-        if not len(self.offsets):
-            return np.empty(0, kind)
-        windows = np.lib.stride_tricks.sliding_window_view(self.data, kind.itemsize)
-        values: NDArray[Any] = windows[self.offsets + at].view(kind).ravel()
-        return values
+        return taken(self.data, self.offsets + at, kind)
 
 
 _NO_PLACES: Places = (np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def iter_batches(chunks: Iterable[Chunk], channel_id: int) -> Iterator[Batch]:
-    """Batches of a channel's messages; small chunks are joined before they are looked at."""
+    """Batches of a channel's messages in file order."""
+    waiting: list[Batch] = []
+    for batch in _batches(chunks, channel_id):
+        if 2 * int(batch.lengths.sum()) > len(batch.data):
+            waiting.append(batch)
+            if sum(len(part.data) for part in waiting) < _MERGE_BYTES:
+                continue
+            batch = _merged(waiting)
+        elif waiting:
+            yield _merged(waiting)
+        yield batch
+        waiting = []
+    if waiting:
+        yield _merged(waiting)
+
+
+def _merged(parts: list[Batch]) -> Batch:
+    """One batch out of several that hold little but messages of varying length.
+
+    There are as many calls of numpy for a batch as there are shapes in it, whatever its size.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.cumsum([0, *(len(part.data) for part in parts[:-1])])
+    offsets = [part.offsets + start for part, start in zip(parts, starts, strict=True)]
+    lengths = np.concatenate([part.lengths for part in parts])
+    data = np.concatenate([part.data for part in parts])
+    return Batch(data, None, np.concatenate(offsets), lengths)
+
+
+def _batches(chunks: Iterable[Chunk], channel_id: int) -> Iterator[Batch]:
+    """Small chunks are joined before they are looked at."""
     parts: list[memoryview] = []
     size, lead = 0, b""
     for chunk in chunks:
@@ -201,10 +233,9 @@ def _indexed(array: NDArray[np.uint8], chunk: Chunk, channel_id: int) -> Places 
     offsets = chunk.message_offsets()
     if offsets is None or not len(offsets) or offsets[-1] > len(array) - PAYLOAD or offsets[0] < 0:
         return None
-    heads = np.lib.stride_tricks.sliding_window_view(array, 11)[offsets]
-    row = (len(offsets),)
-    lengths = np.ndarray(row, "<u8", heads, 1, (11,)) + np.uint64(_HEAD.size)
-    is_message = (heads[:, 0] == records.MESSAGE).all() and (lengths >= PAYLOAD).all()
+    heads = taken(array, offsets, _START)
+    lengths = heads["length"] + np.uint64(_HEAD.size)
+    is_message = (heads["opcode"] == records.MESSAGE).all() and (lengths >= PAYLOAD).all()
     if not is_message or (lengths > len(array)).any():
         return None
     whole = lengths.astype(np.int64)
@@ -213,7 +244,7 @@ def _indexed(array: NDArray[np.uint8], chunk: Chunk, channel_id: int) -> Places 
     for gap in np.flatnonzero(ends != starts).tolist():
         if not _is_filler(chunk.data, int(ends[gap]), int(starts[gap])):
             return None
-    mine = np.ndarray(row, "<u2", heads, 9, (11,)) == channel_id
+    mine = heads["channel"] == channel_id
     return offsets[mine], whole[mine]
 
 
@@ -248,5 +279,15 @@ def walk_messages(data: memoryview, channel_id: int) -> Places:
 def _gather(array: NDArray[np.uint8], offsets: NDArray[np.int64], length: int) -> Rows:
     if len(offsets) == 1:
         return Rows(array, int(offsets[0]), length, 1, length)
-    windows = np.lib.stride_tricks.sliding_window_view(array, length)
-    return Rows(windows[offsets].reshape(-1), 0, length, len(offsets), length)
+    data = taken(array, offsets, np.dtype((np.void, length))).view(np.uint8)
+    return Rows(data, 0, length, len(offsets), length)
+
+
+def taken(array: NDArray[np.uint8], offsets: NDArray[np.int64], kind: DTypeLike) -> NDArray[Any]:
+    """The values of `kind` that begin at `offsets`, however they are aligned; copies."""
+    form = np.dtype(kind)
+    places = len(array) - form.itemsize + 1
+    if not len(offsets):
+        return np.empty(0, form)
+    values: NDArray[Any] = np.ndarray((places,), form, array, 0, (1,))[offsets]
+    return values

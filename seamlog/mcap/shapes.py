@@ -18,6 +18,7 @@ from seamlog.mcap.records import Malformed
 from seamlog.mcap.rows import PAYLOAD, Batch, Rows
 
 Read: TypeAlias = Callable[[Rows], NDArray[Any]]
+_SHORT_TEXT = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,13 +138,11 @@ def numbers_leaf(name: str, at: int, form: str, count: int) -> Leaf:
     return Leaf(name, read, count, lambda place: read_number(at + place * width, form))
 
 
-def texts_leaf(name: str, places: Sequence[tuple[int, int]]) -> Leaf:
-    """A sequence of texts, each at its offset with its size: one list per row."""
-    return Leaf(name, read_texts(places), len(places), lambda place: read_text(*places[place]))
-
-
 def stacked_leaf(name: str, reads: Sequence[Read]) -> Leaf:
     """A sequence read one element at a time: one array (a list, of objects) per row."""
+    places = [read for read in reads if isinstance(read, Text)]
+    if len(places) == len(reads):
+        return Leaf(name, read_texts(places), len(places), lambda place: places[place])
     return Leaf(
         name,
         lambda rows: stacked([read(rows) for read in reads]),
@@ -209,43 +208,62 @@ def sequence_of(form: Form) -> Form:
     return Form(object, None, form.dtype if form.count is None else object)
 
 
-def read_text(at: int, size: int) -> Read:
-    """Reads UTF-8 text."""
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Reads UTF-8 text of `size` bytes at `at`."""
 
-    def read(rows: Rows) -> NDArray[Any]:
-        raw = rows.column(at, "u1", size)
-        if (raw == raw[0]).all():
-            return repeated(decoded(bytes(raw[0])), rows.count)
+    at: int
+    size: int
+
+    def __call__(self, rows: Rows) -> NDArray[Any]:
+        """One text per row."""
+        if self.is_same(rows):
+            return repeated(self.first(rows), rows.count)
+        raw, size = rows.column(self.at, "u1", self.size), self.size
         starts = range(0, rows.count * size, size)
         return texts(
             raw.tobytes().decode("latin-1"), starts, range(size, (rows.count + 1) * size, size)
         )
 
-    return read
+    def first(self, rows: Rows) -> str:
+        """The text of the first row."""
+        return decoded(bytes(rows.column(self.at, "u1", self.size)[0]))
+
+    def is_same(self, rows: Rows) -> bool:
+        """Whether all rows have the same text; a word at a time where it is short."""
+        if rows.count == 1:
+            return True
+        if self.size > _SHORT_TEXT:
+            raw = rows.column(self.at, "u1", self.size)
+            return bool((raw == raw[0]).all())
+        for at in range(0, self.size, 8):
+            width = min(8, self.size - at)
+            words = rows.column(self.at + at + width - 8, "<u8") >> np.uint64(64 - 8 * width)
+            if (words != words[0]).any():
+                return False
+        return True
 
 
-def read_texts(places: Sequence[tuple[int, int]]) -> Read:
-    """Reads a list of texts, each at its offset with its size; offsets increase."""
-    if not places:
-        return constant([], object)
-    start, end = places[0][0], sum(places[-1])
+def read_texts(places: Sequence[Text]) -> Read:
+    """Reads a list of texts."""
 
     def read(rows: Rows) -> NDArray[Any]:
-        raw = rows.column(start, "u1", end - start)
-        if (raw == raw[0]).all():
-            one = bytes(raw[0])
-            found = [decoded(one[at - start : at - start + size]) for at, size in places]
-            return constant(found, object)(rows)
-        return lists([read_text(*place)(rows) for place in places])
+        if all(text.is_same(rows) for text in places):
+            return constant([text.first(rows) for text in places], object)(rows)
+        return lists([text(rows) for text in places])
 
     return read
 
 
 def stacked(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """One array (a list, of objects) per row, out of one column per record."""
-    if any(column.dtype == object for column in columns):
+    first = columns[0]
+    if first.dtype == object:
         return lists(columns)
-    return objects(native(np.stack(columns, axis=1)))
+    table = np.empty((len(first), len(columns), *first.shape[1:]), first.dtype.newbyteorder("="))
+    for place, column in enumerate(columns):
+        table[:, place] = column
+    return objects(table)
 
 
 def lists(columns: Iterable[NDArray[Any]]) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from mcap.writer import Writer
 import seamlog
 from seamlog.errors import SessionError
 from seamlog.mcap import columns as columns_module
+from seamlog.mcap import rows as rows_module
 from tests.core.protobuf_schemas import TYPES, everything, joint_states
 
 STAMP_NS = 1_767_225_600_000_000_123
@@ -31,9 +32,9 @@ ALL_FILES, JOINT_FILES = everything(), joint_states()
 All, JointStates = make_class(ALL_FILES, "test.All"), make_class(JOINT_FILES, "test.JointStates")
 
 
-def write(path: Path, payloads: list[bytes], files: Any, name: str) -> Path:
+def write(path: Path, payloads: list[bytes], files: Any, name: str, chunk: int = 1 << 20) -> Path:
     with path.open("wb") as file:
-        writer = Writer(file)
+        writer = Writer(file, chunk_size=chunk)
         writer.start()
         schema = writer.register_schema(name, "protobuf", files.SerializeToString())
         channel = writer.register_channel("/x", "protobuf", schema)
@@ -135,10 +136,48 @@ def test_time_stamps_and_repeated_messages_become_columns(tmp_path: Path) -> Non
     assert columns["joints.velocity"][4].shape == (0,)
 
 
+def test_chunks_are_read_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Uniform chunks and varied ones in turn; the order of the file stays."""
+    monkeypatch.setattr(rows_module, "_JOIN_BYTES", 1000)
+    monkeypatch.setattr(rows_module, "_MERGE_BYTES", 6000)
+    rows = [joints(place, 2 if place // 100 % 2 else place % 5) for place in range(700)]
+    payloads = [row.SerializeToString() for row in rows]
+    path = write(tmp_path / "x.mcap", payloads, JOINT_FILES, "test.JointStates", 1500)
+    columns = read(path)
+    assert columns["log_time_ns"].tolist() == list(range(700))
+    wanted = [[joint.effort for joint in row.joints] for row in rows]
+    assert [values.tolist() for values in columns["joints.effort"]] == wanted
+    assert columns["joints.name"].tolist() == [[joint.name for joint in r.joints] for r in rows]
+
+
 def test_one_field_can_be_picked(tmp_path: Path) -> None:
     payloads = [joints(place, 2).SerializeToString() for place in range(5)]
     path = write(tmp_path / "x.mcap", payloads, JOINT_FILES, "test.JointStates")
     assert set(read(path, ["joints.effort"])) == {"log_time_ns", "stamp_ns", "joints.effort"}
+
+
+def test_an_empty_packed_field_is_an_empty_sequence(tmp_path: Path) -> None:
+    number = next(field for field in All.DESCRIPTOR.fields if field.name == "many_int32").number
+    tag = (number << 3 | 2) % 128 | 128, (number << 3 | 2) // 128
+    payloads = [bytes([*tag, 0]), All(many_int32=[1, 300]).SerializeToString()]
+    columns = read(write(tmp_path / "x.mcap", payloads, ALL_FILES, "test.All"))
+    assert [values.tolist() for values in columns["many_int32"]] == [[], [1, 300]]
+    assert columns["many_int32"][0].dtype == np.int32
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.integers(0, 2**64 - 1) | st.integers(0, 2**14), min_size=1, max_size=20))
+def test_varints_of_every_length_are_exact(values: list[int]) -> None:
+    rows = [
+        All(one_uint64=value, one_string="x" * (place % 3)) for place, value in enumerate(values)
+    ]
+    rows += [All(one_int64=value - 2**63, one_sint64=value - 2**63) for value in values]
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "x.mcap"
+        write(path, [row.SerializeToString() for row in rows], ALL_FILES, "test.All")
+        columns = read(path, ["one_uint64", "one_int64", "one_sint64"])
+    for name in ("one_uint64", "one_int64", "one_sint64"):
+        assert columns[name].tolist() == [getattr(row, name) for row in rows]
 
 
 @pytest.mark.parametrize(
