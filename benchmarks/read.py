@@ -351,7 +351,10 @@ def foreign(folder: Path, count: int) -> Iterator[Figure]:
             names = QUANTITIES[encoding]
             picked = [FIRST_JOINT[encoding].format(name) for name in names]
             fields = [*ALL_FIELDS[encoding], *(EVERY_JOINT[encoding].format(n) for n in names)]
-            for told, wanted, pick in (("first joint", picked, first), ("all", fields, whole)):
+            for told, wanted, pick in (
+                ("first joint", picked, first),
+                ("all fields", fields, whole),
+            ):
                 name, target = f"varying {encoding}, {told}", ">= 50" if pick is first else ""
                 agree(columns_of(few, wanted), wanted, decoded(few, pick, Ros2, Protobuf))
                 own = cpu_s(lambda p=path, f=wanted: columns_of(p, f)) / count

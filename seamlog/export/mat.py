@@ -63,6 +63,16 @@ def _value(column: NDArray[Any]) -> NDArray[Any]:
         return column
     cells = np.empty(len(column), object)
     for place, value in enumerate(column):
-        is_list = isinstance(value, list)
-        cells[place] = np.array(value, object) if is_list else ("" if value is None else value)
+        cells[place] = _cell(value)
+    return cells
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return np.frombuffer(value, np.uint8)
+    if not isinstance(value, list):
+        return "" if value is None else value
+    cells = np.empty(len(value), object)
+    for place, item in enumerate(value):
+        cells[place] = _cell(item)
     return cells

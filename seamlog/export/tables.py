@@ -1,6 +1,5 @@
 """Topics as Parquet and CSV tables."""
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from seamlog.files import replacing
 from seamlog.mcap.columns import Columns
 from seamlog.session import Session
 
-from .parts import iter_parts, units_of
+from .parts import as_text, iter_parts, units_of
 
 _DANGEROUS = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet would take for a formula at the beginning of a text."""
@@ -29,10 +28,11 @@ def write_parquet(session: Session, topic: str, path: Path, force: bool) -> int:
     with replacing(path, force) as partial:
         try:
             for columns in iter_parts(session, topic):
-                table = _table(columns, units, {"topic": topic, **metadata})
+                known = writer.schema if writer else None
+                table = _table(columns, units, {"topic": topic, **metadata}, known)
                 if writer is None:
                     writer = pq.ParquetWriter(partial, table.schema, compression="zstd")
-                writer.write_table(table.cast(writer.schema))
+                writer.write_table(table)
                 count += table.num_rows
         finally:
             if writer is not None:
@@ -40,36 +40,49 @@ def write_parquet(session: Session, topic: str, path: Path, force: bool) -> int:
     return count
 
 
-def _table(columns: Columns, units: dict[str, str], metadata: dict[str, str]) -> pa.Table:
-    arrays = {name: _array(column) for name, column in columns.items()}
+def _table(
+    columns: Columns, units: dict[str, str], metadata: dict[str, str], known: pa.Schema | None
+) -> pa.Table:
+    """`known` is the schema of an earlier part."""
+    if known is not None:
+        arrays = [_array(column, known.field(name).type) for name, column in columns.items()]
+        return pa.table(arrays, schema=known)
+    arrays = [_array(column, None) for column in columns.values()]
     fields = [
         pa.field(name, array.type, metadata={"unit": units[name]} if name in units else None)
-        for name, array in arrays.items()
+        for name, array in zip(columns, arrays, strict=True)
     ]
-    return pa.table(list(arrays.values()), schema=pa.schema(fields, metadata=metadata))
+    return pa.table(arrays, schema=pa.schema(fields, metadata=metadata))
 
 
-def _array(column: NDArray[Any]) -> pa.Array:
+def _array(column: NDArray[Any], known: pa.DataType | None) -> pa.Array:
+    """Values of mixed kinds, which no type of Arrow holds, become text."""
     if column.ndim == 2:
         flat = pa.array(np.ascontiguousarray(column).reshape(-1))
         return pa.FixedSizeListArray.from_arrays(flat, column.shape[1])
     if column.dtype != object:
         return pa.array(column)
-    kind = _type_of(next((value for value in column if value is not None), ""))
-    if kind is None:
-        return pa.array([_as_text(value) for value in column], pa.string())
-    return pa.array(list(column), kind)
+    kind = known or _type_of(column)
+    if kind != pa.string():
+        try:
+            return pa.array(list(column), kind)
+        except (pa.ArrowInvalid, pa.ArrowTypeError):
+            if known is not None:
+                return pa.array([[as_text(item) for item in value] for value in column], known)
+    return pa.array([as_text(value) for value in column], pa.string())
 
 
-def _type_of(value: Any) -> Any:
-    """Arrow type of a column of such objects; None where they must become text."""
+def _type_of(column: NDArray[Any]) -> pa.DataType:
+    """Arrow type of a column of objects, by the first that tells something."""
+    told = (value for value in column if isinstance(value, np.ndarray | bytes | str) or value)
+    value = next(told, [""] if any(isinstance(value, list) for value in column) else "")
     if isinstance(value, np.ndarray) and value.ndim == 1:
         return pa.list_(pa.from_numpy_dtype(value.dtype))
-    if isinstance(value, str | bytes):
-        return pa.string() if isinstance(value, str) else pa.binary()
-    if isinstance(value, list) and all(isinstance(item, str) for item in value):
+    if isinstance(value, bytes):
+        return pa.binary()
+    if isinstance(value, list) and isinstance(value[0], str):
         return pa.list_(pa.string())
-    return None
+    return pa.string()
 
 
 def write_csv(session: Session, topic: str, path: Path, force: bool) -> int:
@@ -99,23 +112,11 @@ def _cells(columns: Columns) -> Iterator[tuple[str, pa.Array]]:
             for place in range(column.shape[1]):
                 yield f"{name}[{place}]", pa.array(np.ascontiguousarray(column[:, place]))
         elif column.dtype == object:
-            yield name, pa.array([_guarded(_as_text(value)) for value in column], pa.string())
+            yield name, pa.array([_guarded(as_text(value)) for value in column], pa.string())
         elif column.dtype.kind == "b":
             yield name, pa.array(column.astype(np.int8))
         else:
             yield name, pa.array(column)
-
-
-def _as_text(value: Any) -> str:
-    if value is None or isinstance(value, str):
-        return value or ""
-    if isinstance(value, bytes):
-        return value.hex()
-    return json.dumps(value, default=_plain)
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 
 def _guarded(text: str) -> str:

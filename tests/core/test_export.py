@@ -148,12 +148,6 @@ def test_motion_jpeg_survives_the_way_there_and_back(session_path: Path) -> None
     assert shift.max() <= 1_000_000
 
 
-def test_rerun_holds_the_numbers(session_path: Path) -> None:
-    path = export(session_path, "w.rrd", "--topic", "/table/encoder")
-    assert path.read_bytes()[:3] == b"RRF"
-    assert path.stat().st_size > ROWS * 16
-
-
 def test_a_range_of_time_is_exported(session_path: Path) -> None:
     words = ("--topic", "/table/encoder", "--from", "0.4", "--to", "0.8")
     rows = pq.read_table(export(session_path, "e.parquet", *words))["stamp_ns"].to_pylist()
