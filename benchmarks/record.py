@@ -1,14 +1,14 @@
 """Recording beside mcap and foxglove-sdk on the same data: what the live loop pays, and the file.
 
-Data: messages of 36 bytes (stamp + 3 doubles), pictures of 640 x 480 and of 30 kB. Paced: 1 kHz
-encoder + 30 fps, always beside an empty loop. Peers write in the loop, as their users do.
+Data: messages of 36 bytes (stamp + 3 doubles), pictures of 640 x 480 in colour and grey, JPEGs of
+30 kB. Paced: 1 kHz encoder + 30 fps, always beside an empty loop. Peers write in the loop, as their
+users do, and make JPEGs of raw pictures there.
 """
 
 import itertools
-import struct
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,105 +16,17 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 from figures import Figure, cpu_s, optional_peer, options, tell
+from loops import PICTURES, TOPIC, Loop, Picture, foxglove_loop, mcap_loop, no_loop, own_loop
 from mcap.writer import Writer
 
 from seamlog.channels import CHANNELS
 from seamlog.mcap.batch import BatchWriter
-from seamlog.messages import CDR_HEADER_INT, definition, encode_image, layout
+from seamlog.messages import definition, encode_image
 from seamlog.recorder import Recorder
 
-TOPIC, PICTURES = "/table/reference", "/camera/image"
 START_NS = 1_767_225_600_000_000_000
-PAYLOAD = struct.Struct("<I" + layout(TOPIC).codes)
 BATCH = 10_000
 """Messages between two pauses in which the recorder process empties the ring."""
-
-
-class Loop(NamedTuple):
-    """What a live loop calls."""
-
-    number: Callable[[int, float, float, float], Any]
-    picture: Callable[[int, np.ndarray[Any, Any]], Any]
-
-
-def jpeg(image: np.ndarray[Any, Any]) -> bytes:
-    """The picture as the recorder encodes it."""
-    return cv2.imencode(".jpg", image, (cv2.IMWRITE_JPEG_QUALITY, 90))[1].tobytes()
-
-
-def no_loop(_stack: ExitStack, _folder: Path) -> Loop:
-    """An empty control."""
-    return Loop(lambda _t, _a, _b, _c: None, lambda _t, _image: None)
-
-
-def own_loop(stack: ExitStack, folder: Path) -> Loop:
-    """The recorder."""
-    recorder = stack.enter_context(Recorder(folder / "own.mcap", force=True))
-    put = recorder.channel(TOPIC).put
-    recorder.channel(PICTURES)
-    return Loop(put, lambda stamp, image: recorder.log_frame(PICTURES, image, stamp))
-
-
-def mcap_loop(stack: ExitStack, folder: Path) -> Loop:
-    """The `mcap` package as it comes: zstd, chunks of 1 MiB."""
-    writer = Writer(stack.enter_context((folder / "mcap.mcap").open("wb")))
-    writer.start("ros2", "benchmark")
-    stack.callback(writer.finish)
-    ids = {
-        topic: writer.register_channel(
-            topic,
-            "cdr",
-            writer.register_schema(
-                CHANNELS[topic].schema, "ros2msg", definition(CHANNELS[topic]).encode()
-            ),
-        )
-        for topic in (TOPIC, PICTURES)
-    }
-    number, picture, add, pack = ids[TOPIC], ids[PICTURES], writer.add_message, PAYLOAD.pack
-    sequence = iter(range(1 << 32)).__next__
-    return Loop(
-        lambda t, a, b, c: add(
-            number, time.time_ns(), pack(CDR_HEADER_INT, t, a, b, c), t, sequence()
-        ),
-        lambda t, image: add(
-            picture, time.time_ns(), encode_image(t, "camera", "jpeg", jpeg(image)), t, 0
-        ),
-    )
-
-
-def foxglove_loop(stack: ExitStack, folder: Path, compressed: bool = True) -> Loop:
-    """foxglove-sdk, zstd as it comes or uncompressed."""
-    import foxglove
-    from foxglove.mcap import MCAPCompression, MCAPWriteOptions
-
-    context = foxglove.Context()
-    stack.callback(lambda: context)
-    zstd = MCAPCompression.Zstd if compressed else None
-    written = MCAPWriteOptions(compression=zstd, profile="ros2")
-    path = folder / f"foxglove-{compressed}.mcap"
-    stack.enter_context(
-        foxglove.open_mcap(path, allow_overwrite=True, context=context, writer_options=written)
-    )
-    number, picture = (
-        foxglove.Channel(
-            topic,
-            schema=foxglove.Schema(
-                name=CHANNELS[topic].schema,
-                encoding="ros2msg",
-                data=definition(CHANNELS[topic]).encode(),
-            ),
-            message_encoding="cdr",
-            context=context,
-        )
-        for topic in (TOPIC, PICTURES)
-    )
-    log, pack = number.log, PAYLOAD.pack
-    return Loop(
-        lambda t, a, b, c: log(pack(CDR_HEADER_INT, t, a, b, c), log_time=time.time_ns()),
-        lambda t, image: picture.log(
-            encode_image(t, "camera", "jpeg", jpeg(image)), log_time=time.time_ns()
-        ),
-    )
 
 
 def call_us(
@@ -177,8 +89,9 @@ class Latencies(NamedTuple):
     pictures_s: np.ndarray[Any, Any]
 
 
-def paced(loop: Loop, images: list[np.ndarray[Any, Any]], seconds: float) -> Latencies:
+def paced(loop: Loop, images: Sequence[Picture] | Sequence[bytes], seconds: float) -> Latencies:
     """1 kHz + 30 fps for a while."""
+    log: Callable[[int, Any], Any] = loop.encoded if isinstance(images[0], bytes) else loop.picture
     numbers, pictures = [], []
     start = time.perf_counter()
     for tick in range(int(seconds * 1000)):
@@ -189,14 +102,15 @@ def paced(loop: Loop, images: list[np.ndarray[Any, Any]], seconds: float) -> Lat
         numbers.append(time.perf_counter() - before)
         if tick * 30 // 1000 == len(pictures):
             before = time.perf_counter()
-            loop.picture(stamp, images[len(pictures) % len(images)])
+            log(stamp, images[len(pictures) % len(images)])
             pictures.append(time.perf_counter() - before)
     return Latencies(np.array(numbers), np.array(pictures))
 
 
-def tails(folder: Path, seconds: float) -> Iterator[Figure]:
-    """Tail latencies of the paced loop."""
-    images = pictures_640(16)
+def paced_beside_peers(
+    folder: Path, images: Sequence[Picture] | Sequence[bytes], seconds: float
+) -> dict[str, Latencies]:
+    """The paced loop, empty and with each writer."""
     rows: dict[str, Latencies] = {}
     makers: dict[str, Callable[[ExitStack, Path], Loop]] = {
         "empty": no_loop,
@@ -209,18 +123,39 @@ def tails(folder: Path, seconds: float) -> Iterator[Figure]:
             loop = make(stack, folder)
             time.sleep(0.5)
             rows[name] = paced(loop, images, seconds)
+    return rows
+
+
+def tails(folder: Path, seconds: float) -> Iterator[Figure]:
+    """Tail latencies of the paced loop, with each kind of pictures."""
+    colour = pictures_640(16)
+    rows = paced_beside_peers(folder, colour, seconds)
     yield from sizes(folder)
-    numbers = {name: float(np.percentile(row.numbers_s, 99.9)) for name, row in rows.items()}
-    frames = {name: float(np.percentile(row.pictures_s, 99)) for name, row in rows.items()}
-    for name in rows:
-        yield Figure(f"paced: encoder p99.9, {name}", numbers[name] * 1e3, "ms")
-        yield Figure(f"paced: picture p99, {name}", frames[name] * 1e3, "ms")
-    yield Figure("paced: put p99.9", numbers["seamlog"] * 1e3, "ms", "<= 0.5")
+    yield from encoder_tails(rows)
+    yield from picture_tails("colour", rows)
+    grey = [np.ascontiguousarray(image[:, :, 1]) for image in colour]
+    yield from picture_tails("grey", paced_beside_peers(folder, grey, seconds))
+    yield from picture_tails("JPEG", paced_beside_peers(folder, jpegs(64), seconds))
+
+
+def encoder_tails(rows: dict[str, Latencies]) -> Iterator[Figure]:
+    """The slowest of a thousand encoder messages."""
+    tail_ms = {n: float(np.percentile(row.numbers_s, 99.9)) * 1e3 for n, row in rows.items()}
+    for name, value in tail_ms.items():
+        bound = "<= 0.5" if name == "seamlog" else ""
+        yield Figure(f"paced: encoder p99.9, {name}", value, "ms", bound)
     if "foxglove-zstd" in rows:
-        ratio = numbers["foxglove-zstd"] / numbers["seamlog"]
+        ratio = tail_ms["foxglove-zstd"] / tail_ms["seamlog"]
         yield Figure("paced: encoder p99.9, foxglove-zstd / ours", ratio, "x", ">= 10")
-    ratio = frames["mcap"] / frames["seamlog"]
-    yield Figure("paced: picture p99, mcap / ours", ratio, "x", ">= 30")
+
+
+def picture_tails(kind: str, rows: dict[str, Latencies]) -> Iterator[Figure]:
+    """The slowest of a hundred pictures."""
+    tail_ms = {n: float(np.percentile(row.pictures_s, 99)) * 1e3 for n, row in rows.items()}
+    for name, value in tail_ms.items():
+        yield Figure(f"paced: {kind} picture p99, {name}", value, "ms")
+    ratio = tail_ms["mcap"] / tail_ms["seamlog"]
+    yield Figure(f"paced: {kind} picture p99, mcap / ours", ratio, "x", ">= 30")
 
 
 def sizes(folder: Path) -> Iterator[Figure]:
@@ -234,7 +169,7 @@ def sizes(folder: Path) -> Iterator[Figure]:
             yield Figure(f"paced: file, ours / {label}", own / peer.stat().st_size, "x")
 
 
-def pictures_640(count: int) -> list[np.ndarray[Any, Any]]:
+def pictures_640(count: int) -> list[Picture]:
     """Colour pictures with a bright line and noise."""
     generator = np.random.default_rng(0)
     found = []
@@ -361,7 +296,7 @@ def main() -> None:
         folder = Path(name)
         figures = [
             *caller(folder, 5 if chosen.quick else 20),
-            *tails(folder, 3.0 if chosen.quick else 20.0),
+            *tails(folder, 3.0 if chosen.quick else 15.0),
             *batches(folder, 200_000 if chosen.quick else 1_000_000),
             *frames(folder, 500 if chosen.quick else 3000),
         ]

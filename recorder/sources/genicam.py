@@ -159,10 +159,10 @@ def _producers() -> list[Path]:
 def _camera_ns(buffer: Any) -> int | None:
     """The camera's own time; None where the producer has none."""
     try:
-        found = buffer.timestamp_ns
+        ticks, frequency_hz = int(buffer.timestamp), int(buffer.timestamp_frequency)
     except Exception:  # noqa: BLE001 - errors of the GenTL producer have no common base
         return None
-    return int(found) if found else None
+    return ticks * 10**9 // frequency_hz if ticks and frequency_hz else None
 
 
 def _image(component: Any) -> NDArray[np.uint8]:

@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import time
 from pathlib import Path
@@ -58,9 +59,7 @@ def test_the_loop_goes_on_without_its_recorder_process(tmp_path: Path) -> None:
         assert unfinished.metadata["seamlog.recording"]["id"] == recorder.id
     folder = root() / recorder.id
     assert sorted(path.suffix for path in folder.glob("*.ring")) == [".ring", ".ring"]
-    for path in folder.iterdir():
-        path.unlink()
-    folder.rmdir()
+    shutil.rmtree(folder)
 
 
 def test_only_the_recorder_killed(tmp_path: Path) -> None:
@@ -76,6 +75,7 @@ def test_only_the_recorder_killed(tmp_path: Path) -> None:
     recorder.close()
     in_file = unfinished_stamps(tmp_path / "weld.mcap.part", "/table/encoder")
     in_rings = ring_stamps(root() / recorder.id)["/table/encoder"]
+    shutil.rmtree(root() / recorder.id)
     assert sorted({*in_file, *in_rings}) == accepted == list(range(600))
 
 
@@ -87,6 +87,4 @@ def test_a_simulated_loop_does_not_wait_for_a_dead_recorder(tmp_path: Path) -> N
     status = recorder.close()
     assert status.channels[0].dropped > 0
     folder = root() / recorder.id
-    for path in folder.iterdir():
-        path.unlink()
-    folder.rmdir()
+    shutil.rmtree(folder)

@@ -1,6 +1,8 @@
 """Cameras: GenICam's virtual producer, a network camera of our own, and those that are missing."""
 
 import os
+import shutil
+import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -40,6 +42,30 @@ def test_a_camera_without_time_stamps(tmp_path: Path, producer: Path) -> None:
         assert frames[0].image().shape == (400, 400, 3)
         columns = opened.columns(TOPIC, ["stamp_ns"])
     assert (np.abs(columns["log_time_ns"] - columns["stamp_ns"]) < 10**9).all()
+
+
+@pytest.mark.parametrize("flags", [("-DTICKS_HZ=125000000",), ("-DTICKS_HZ=1000", "-DWITH_NS")])
+def test_a_camera_with_time_stamps(tmp_path: Path, producer: Path, flags: tuple[str, ...]) -> None:
+    stamped, session = tmp_path / "stamped.cti", tmp_path / "weld.mcap"
+    source = Path(__file__).with_name("stamped.c")
+    compiler = shutil.which("gcc") or pytest.skip("no gcc to build a GenTL producer with")
+    folder = producer.parent
+    linked = ["-L", str(folder), f"-l:{producer.name}", f"-Wl,-rpath,{folder}", "-ldl"]
+    command = [compiler, "-shared", "-fPIC", "-D_GNU_SOURCE", *flags, str(source), "-o"]
+    subprocess.run([*command, str(stamped), "-Wl,--no-as-needed", *linked], check=True)
+    options = ["--source", "genicam", "--set", f"source.producer={stamped}"]
+    with recording(session, *options) as running:
+        running.wait_until(until_logged(session, TOPIC, 20))
+        ended = running.interrupt()
+    assert ended.code == 0, ended.errors
+    with open_session(session) as opened:
+        assert opened.channel_metadata(TOPIC)["stamp"] == "camera"
+        columns = opened.columns(TOPIC, ["stamp_ns"])
+    assert (columns["stamp_ns"] <= columns["log_time_ns"]).all()
+    assert (columns["log_time_ns"] - columns["stamp_ns"] < 10**9).all()
+    # Whole milliseconds apart, but for what the clocks may drift.
+    steps = np.diff(columns["stamp_ns"][2:])
+    assert (np.abs(steps - np.round(steps, -6)) < 50_000).mean() > 0.8
 
 
 @pytest.mark.parametrize(
