@@ -11,15 +11,9 @@ from seamlog.errors import EvidenceError
 
 from .chain import best_chain
 from .curve import Centreline
-from .edge_model import (
-    EdgeModel,
-    EdgePlaces,
-    Window,
-    choose_model,
-    locate_edges,
-    profiles_at,
-    typical_blur,
-)
+from .edge_model import EdgeModel, choose_model, profiles_at, typical_blur
+from .edge_places import EdgePlaces, locate_edges
+from .edge_shapes import Window
 from .image import Photo
 from .plane import Plane
 from .sampling import sample_offsets

@@ -26,6 +26,8 @@ from .synthetic_surface import (
 Floats = NDArray[np.float64]
 
 RIPPLE_MM = 0.9
+_SUB = 3
+"""Sub-samples of a pixel along each of its sides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +208,7 @@ def render(scene: Scene, seed: int = 0) -> SyntheticBead:
         left_mm=left,
         right_mm=right,
         gaps_mm=gaps,
+        footprint_mm=scene.mm_per_px / _SUB,
     )
     picture, plate = _sample(scene, seam, surface, matrix)
     picture += plate * brushed(rng, picture.shape, scene.texture)

@@ -55,16 +55,24 @@ class Surface:
     left_mm: Floats
     right_mm: Floats
     gaps_mm: tuple[tuple[float, float], ...]
+    footprint_mm: float
 
     def grey(self, s: Floats, offset: Floats) -> tuple[Floats, Floats]:
-        """Grey level at places (s, signed offset), and 1.0 where there is plate."""
+        """Grey level at places (s, signed offset), and the part of each that is plate.
+
+        A place is `footprint_mm` across; a toe that runs through it divides its area.
+        """
         half = self.half_width(s, offset)
-        on_bead = np.abs(offset) < half
+        outside = np.abs(offset) - half
+        bead = np.clip(0.5 - outside / self.footprint_mm, 0.0, 1.0)
         for first, last in self.gaps_mm:
-            on_bead &= ~((s >= first) & (s < last))
-        value = self._plate(np.abs(offset) - half)
-        value[on_bead] = self._bead(s[on_bead], (offset / half)[on_bead], half[on_bead])
-        return value, np.where(on_bead, 0.0, 1.0)
+            bead[(s >= first) & (s < last)] = 0.0
+        value = (1.0 - bead) * self._plate(outside)
+        on_bead = bead > 0
+        value[on_bead] += bead[on_bead] * self._bead(
+            s[on_bead], (offset / half)[on_bead], half[on_bead]
+        )
+        return value, 1.0 - bead
 
     def half_width(self, s: Floats, offset: Floats) -> Floats:
         """Half width on the side of `offset`."""

@@ -16,7 +16,7 @@ from .plane import Plane, Points
 
 Floats = NDArray[np.float64]
 
-_FAINT = 0.04
+_FAINT = 0.08
 """Noise of a toe, as a part of the width, above which a station is flagged."""
 _REFUSED = 0.2
 _ROUND_END = 0.5

@@ -25,11 +25,24 @@ def test_toes_lie_where_the_truth_says(perspective: float) -> None:
     seam = np.column_stack([bead.x_mm, bead.y_mm])[keep]
     px_from_mm = np.linalg.inv(bead.calibration.matrix())
     for side, half in ((-1, bead.left_mm[keep]), (1, bead.right_mm[keep])):
-        for beyond, level in ((-0.15, SMALL.base + SMALL.contrast), (0.15, SMALL.base)):
+        for beyond, level in ((-0.2, SMALL.base + SMALL.contrast), (0.2, SMALL.base)):
             points = seam + (side * (half + beyond))[:, None] * normal
             raised = np.column_stack([points, np.ones(len(points))]) @ px_from_mm.T
             column, row = np.rint(raised[:, :2] / raised[:, 2:]).astype(int).T
             assert (bead.pixels[row, column] == level).all()
+
+
+def test_a_pixel_at_a_toe_is_as_bright_as_the_part_of_it_that_is_bead() -> None:
+    bead = render(replace(SMALL, width_px=600), 5)
+    slope = np.gradient(bead.y_mm, bead.x_mm)
+    normal = np.column_stack([-slope, np.ones_like(slope)]) / np.hypot(1, slope)[:, None]
+    seam = np.column_stack([bead.x_mm, bead.y_mm])
+    left = seam - bead.left_mm[:, None] * normal
+    right = seam + bead.right_mm[:, None] * normal
+    x_mm = (np.arange(30, 570) + 0.5) * SMALL.mm_per_px
+    high_mm = np.interp(x_mm, *right.T) - np.interp(x_mm, *left.T)
+    bright = (bead.pixels[:, 30:570] - SMALL.base).sum(axis=0) / SMALL.contrast
+    assert bright * SMALL.mm_per_px == pytest.approx(high_mm, abs=0.004)
 
 
 @pytest.mark.parametrize("case", list(CASES))
