@@ -2,7 +2,7 @@
 
     [time]
     column = "t"                    # or rate_hz = 100
-    unit = "s"                      # s, ms, us, ns, min
+    unit = "s"                      # s, ms, us, ns, min, h, d; datenum: days as MATLAB counts
     start = 2019-01-01T00:00:00Z    # what time 0 is; default 1970-01-01, right for unix time
 
     [channels."/table/encoder".fields]
@@ -36,7 +36,7 @@ from seamlog.errors import ConfigError, InputError
 
 from .units import factor_between, is_unit, spelled
 
-TimeUnit = Literal["s", "ms", "us", "ns", "min"]
+TimeUnit = Literal["s", "ms", "us", "ns", "min", "h", "d", "datenum"]
 
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)

@@ -1,6 +1,6 @@
 """`seamlog import`: a foreign log becomes a session, with a loss report."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -57,7 +57,8 @@ def import_(
     """Turn the foreign log FILE (or the folder of a ROS 2 bag) into a session.
 
     Nothing is derived on the way: what FILE does not have stays NaN and is listed as absent. Exit
-    code 1 if parts or messages of a bag, or frames of a video, could not be taken.
+    code 1 if something that was asked for could not be taken: parts or messages of a bag, frames of
+    a video, lines of a table, cells of a column that the map names.
     """
     from seamlog import plugins
     from seamlog.files import check_output
@@ -76,7 +77,8 @@ def import_(
         with _as_session(reader, file) as (content, copied, report):
             if guess:
                 return _guess(content, file, target)
-            return _import_mapped(content, file, target, map_file, force, copied, report.lines)
+            content.notes += report.notes
+            return _import_mapped(content, file, target, map_file, force, copied, report.losses)
     return _import_whole(reader, file, target, force)
 
 
@@ -102,7 +104,7 @@ def _import_table(
             f"say which column of {file.name} is which field with --map; "
             f"'seamlog import {file} --guess -o map.toml' proposes one"
         )
-    return _import_mapped(content, file, output, map_file, force, None, content.notes)
+    return _import_mapped(content, file, output, map_file, force)
 
 
 def _guess(content: "Content", file: Path, output: Path | None) -> Outcome:
@@ -113,9 +115,10 @@ def _guess(content: "Content", file: Path, output: Path | None) -> Outcome:
     text = guess(content, file)
     if output is not None:
         write_bytes(output, text.encode())
-    notes = [f"# {note}" for note in content.notes]
+    told = [*content.losses, *content.lost_cells.values(), *content.notes]
+    notes = [f"# {note}" for note in told]
     head = [f"# written to {output}"] if output else []
-    document = {"file": str(file), "map": text, "notes": content.notes}
+    document = {"file": str(file), "map": text, "notes": told}
     return Outcome("seamlog.import.guess", "\n".join([text, *notes, *head]), document)
 
 
@@ -125,8 +128,8 @@ def _import_mapped(
     output: Path | None,
     map_file: Path | None,
     force: bool,
-    copied: Path | None,
-    notes: list[str],
+    copied: Path | None = None,
+    losses: Sequence[str] = (),
 ) -> Outcome:
     from seamlog.mcap.batch import BatchWriter
     from seamlog.mcap.file import McapFile
@@ -136,8 +139,8 @@ def _import_mapped(
 
     assert map_file is not None
     mapping = load_column_map(map_file, content.columns, content.units)
-    topics, loss = convert(content.columns, mapping, file, content.times)
-    loss.notes = [*notes, *loss.notes]
+    topics, loss = convert(content, mapping, file)
+    loss.losses = [*losses, *loss.losses]
     if output is not None:
         facts = _provenance(file) | _provenance(map_file, "map")
         facts |= {"source": mapping.source} if mapping.source else {}
@@ -231,7 +234,7 @@ def _outcome(
         lines.append(f"not imported: {', '.join(loss.not_imported)}")
     lines += [f"absent in {topic}: {', '.join(names)}" for topic, names in loss.absent.items()]
     lines += [f"{name}: {count} values missing" for name, count in loss.missing_values.items()]
-    lines += loss.notes
+    lines += [*(f"lost: {text}" for text in loss.losses), *loss.notes]
     document: dict[str, Any] = {
         "file": str(file),
         "session": str(output) if output else None,
@@ -243,9 +246,11 @@ def _outcome(
         "absent": loss.absent,
         "missing_values": loss.missing_values,
         "timing": {topic: asdict(timing) for topic, timing in loss.timing.items()},
+        "losses": loss.losses,
         "notes": loss.notes,
     }
-    return Outcome("seamlog.import", "\n".join(lines), document)
+    ending = Ending.FINDING if loss.losses else Ending.PASS
+    return Outcome("seamlog.import", "\n".join(lines), document, ending)
 
 
 def _timing_text(timing: "Evenness") -> str:

@@ -12,13 +12,16 @@ class Content:
     """Columns (or scalars of shape ()) by their names in the file, and what the file says of them.
 
     `units` holds units that the file states, `times` the column that holds the time of another,
-    `notes` what was left out or had to be decided while reading.
+    `notes` what was left out or had to be decided while reading, `losses` what could not be read,
+    `lost_cells` by column what of it could not be read.
     """
 
     columns: Mapping[str, NDArray[Any]]
     units: dict[str, str] = field(default_factory=dict)
     times: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    losses: list[str] = field(default_factory=list)
+    lost_cells: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass

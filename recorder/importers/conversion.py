@@ -29,11 +29,15 @@ from .column_map import (
     channel_of,
     mappable,
 )
+from .content import Content
 from .units import factor_between, spelled
 
 Columns = Mapping[str, NDArray[Any]]
-_NS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0, "min": 60e9}
+_NS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0, "min": 60e9, "h": 3600e9, "d": 86400e9}
+_NS["datenum"] = _NS["d"]
+_DATENUM_OF_1970 = 719_529
 _LAST_NS = (1 << 63) - 1
+_COARSE_NS = 100.0
 _EMPTY = {"float64": np.nan, "float32": np.nan}
 
 
@@ -56,24 +60,30 @@ class Loss:
     missing_values: dict[str, int] = field(default_factory=dict)
     timing: dict[str, Evenness] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    losses: list[str] = field(default_factory=list)
 
 
 def convert(
-    columns: Columns, mapping: ColumnMap, path: Path, times: Mapping[str, str] | None = None
+    content: Content, mapping: ColumnMap, path: Path
 ) -> tuple[dict[str, TopicColumns], Loss]:
     """Topics with their columns, `stamp_ns` among them, and the loss report.
 
-    `times` names the columns (ns since 1970) that the file states as the times of others; `path`
+    Lost is what the file has of the columns that the map asks for and could not be read. `path`
     names the file in errors (`ImportFailed`).
     """
+    columns, times = content.columns, content.times
     used = _used(mapping)
-    stated = set((times or {}).values())
+    stated = set(times.values())
     loss = Loss(0, sorted(name for name in columns if name not in used | stated))
+    loss.notes = [*content.notes]
+    loss.losses = [*content.losses]
+    loss.losses += [text for name, text in content.lost_cells.items() if name in used]
     topics = {}
     for topic, entry in mapping.channels.items():
         channel = channel_of(topic, entry)
-        stamp_ns = _stamps(columns, _time_of(topic, entry, mapping, times or {}, path), entry, path)
+        stamp_ns = _stamps(columns, _time_of(topic, entry, mapping, times, path), entry, path)
         loss.rows = max(loss.rows, len(stamp_ns))
+        loss.notes += _coarse(columns, entry.time or mapping.time)
         timing = evenness_of(stamp_ns)
         if timing:
             loss.timing[topic] = timing
@@ -142,6 +152,16 @@ def _time_of(
     )
 
 
+def _coarse(columns: Columns, time: TimeMap | None) -> list[str]:
+    """A note where float64 holds the times more coarsely than in ns."""
+    if time is None or time.column is None or columns[time.column].dtype.kind != "f":
+        return []
+    step_ns = float(np.spacing(np.abs(columns[time.column]).max())) * _NS[time.unit]
+    if step_ns < _COARSE_NS:
+        return []
+    return [f"time column {time.column!r}: float64 holds such times in steps of {step_ns:.2g} ns"]
+
+
 def _stamps(columns: Columns, time: TimeMap, entry: ChannelMap, path: Path) -> NDArray[np.int64]:
     since = time.start - datetime(1970, 1, 1, tzinfo=UTC)
     start_ns = (since.days * 86400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
@@ -152,6 +172,8 @@ def _stamps(columns: Columns, time: TimeMap, entry: ChannelMap, path: Path) -> N
         raise ImportFailed(f"{path}: time column {time.column!r} is no column but a single number")
     if values.dtype.kind not in "iuf":
         raise ImportFailed(f"{path}: time column {time.column!r} holds no numbers")
+    if time.unit == "datenum":
+        values = values - _DATENUM_OF_1970
     seconds = values.astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(seconds))
     if len(bad):
@@ -264,7 +286,17 @@ def _typed(item: Field, values: NDArray[np.float64], path: Path) -> NDArray[Any]
             f"{path}: row {bad[0] + 1} has no value for {item.name}, which is a {item.type} and "
             "cannot be missing; leave the field out of the map"
         )
-    return (values != 0) if item.type == "bool" else values.astype(_dtype(item))
+    if item.type == "bool":
+        is_set: NDArray[np.bool_] = values != 0
+        return is_set
+    kept: NDArray[Any] = values.astype(_dtype(item))
+    bad = np.flatnonzero(kept != values)
+    if len(bad):
+        raise ImportFailed(
+            f"{path}: row {bad[0] + 1} has {values[bad[0]]:g} for {item.name}, which is a "
+            f"{item.type} and cannot hold it; correct scale and offset, or leave the field out"
+        )
+    return kept
 
 
 def _dtype(item: Field) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from seamlog.channels import CHANNELS
 
 from .content import Content
-from .units import factor_between, is_unit, spelled
+from .units import TIMES, factor_between, is_unit, spelled
 
 _ACTUAL = r"(act|actual|meas|encoder|enc|ist|feedback|pos$|position$)"
 _WANTED = r"(com+and|cmd|ref|reference|set|soll|target|desired|des)"
@@ -68,8 +68,13 @@ def guess(content: Content, path: Path) -> str:
 
 def _bare(name: str) -> str:
     """The name without group, unit and case, words joined by _."""
-    tail = re.sub(r"[\[(].*?[\])]", "", name.rpartition("/")[2])
+    tail = re.sub(r"[\[(].*?[\])]", "", _without_unit(name).rpartition("/")[2])
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|[\s.\-]+", "_", tail).strip("_").lower()
+
+
+def _without_unit(name: str) -> str:
+    """`Weg` of `Weg / mm`; groups have no blanks around their slash."""
+    return re.sub(r"(\s+[/,]\s*|,\s*| in )[^\s,]+$", "", name)
 
 
 def _time_column(columns: Mapping[str, NDArray[Any]], content: Content) -> str | None:
@@ -81,7 +86,7 @@ def _time_column(columns: Mapping[str, NDArray[Any]], content: Content) -> str |
         return named[0]
     if content.times:
         return None
-    in_time = [name for name in rising if content.units.get(name) in ("s", "ms", "us", "ns", "min")]
+    in_time = [name for name in rising if spelled(content.units.get(name, "")) in TIMES]
     unix = [name for name in rising if 9e8 < float(columns[name].flat[0]) < 3e18]
     return next(iter([*in_time, *unix]), None)
 
@@ -112,22 +117,39 @@ def _time_lines(
     step = float(np.median(np.diff(columns[time].astype(np.float64))))
     unit, why = _time_unit(time, first, step, content)
     lines = ["", "[time]", f"column = {_quoted(time)}", f'unit = "{unit}"  # {why}']
-    scale = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}[unit]
-    if first * scale < 9e8:
+    if unit == "datenum":
+        return lines
+    for epoch, (unit_of_epoch, low, high, who) in _EPOCHS.items():
+        if unit == unit_of_epoch and low <= first < high:
+            return [*lines, f"start = {epoch}T00:00:00Z  # guessed: as {who} count"]
+    if first * _SECONDS[unit] < 9e8:
         lines.append("start = 1970-01-01T00:00:00Z  # the file does not say when it began")
     return lines
 
 
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
+_EPOCHS = {
+    "1899-12-30": ("d", 2e4, 8e4, "spreadsheets"),
+    "1904-01-01": ("s", 3.4e9, 4.3e9, "LabVIEW"),
+}
+"""What time 0 is, told by unit and size of the first value."""
+_DAY_NAME = re.compile(r"dat(e|um)|day|excel|serial", re.I)
+
+
 def _time_unit(name: str, first: float, step: float, content: Content) -> tuple[str, str]:
     stated = spelled(content.units.get(name, ""))
-    if stated in ("s", "ms", "us", "ns", "min"):
+    if stated in TIMES:
         return stated, "as the file says"
     match = _UNIT_AT_END.search(name)
-    if match and match[1].lower() in ("s", "ms", "us", "ns"):
+    if match and match[1].lower() in TIMES:
         return match[1].lower(), "guessed from the name"
     for unit, bound in (("ns", 9e17), ("us", 9e14), ("ms", 9e11), ("s", 9e8)):
         if first >= bound:
             return unit, "guessed: then it is a time since 1970"
+    if 7e5 <= first < 8e5 and step < 1:
+        return "datenum", "guessed: days as MATLAB counts, CHECK"
+    if 2e4 <= first < 8e4 and step < 1 and _DAY_NAME.search(name):
+        return "d", "guessed: days as spreadsheets count, CHECK"
     if step >= 1 and float(step).is_integer():
         return "ms", "guessed from whole steps: CHECK"
     return "s", "guessed: CHECK"
@@ -174,7 +196,11 @@ def _free_lines(
     """What no topic of the table has, one free topic per group and length."""
     groups: dict[tuple[str, int, str], list[str]] = {}
     for name in left:
-        key = (name.rpartition("/")[0], len(columns[name]), content.times.get(name, ""))
+        key = (
+            _without_unit(name).rpartition("/")[0],
+            len(columns[name]),
+            content.times.get(name, ""),
+        )
         groups.setdefault(key, []).append(name)
     lines, topics = [], set()
     for (group, _, _), names in groups.items():
@@ -187,7 +213,7 @@ def _free_lines(
         lines += ["", f'[channels."{topic}".fields]']
         seen: set[str] = set()
         for name in names:
-            field = base_field = _word(name.rpartition("/")[2])
+            field = base_field = _word(_without_unit(name).rpartition("/")[2])
             number = 1
             while field in seen:
                 number += 1
