@@ -28,6 +28,10 @@ _MONTHS |= {
         ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"), 1
     )
 }
+_NO_ZONE = "has no time zone and was taken as UTC"
+_ISO = re.compile(
+    r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)?(?:Z|[-+]\d{2}:?\d{2})?"
+)
 _FORMS = (
     *((re.compile(rf"{date}(?:,?[T ]\s*{_TIME})?{_ZONE}", re.I), "moment") for date in _DATES),
     (re.compile(_TIME + _ZONE, re.I), "time of day"),
@@ -54,6 +58,9 @@ def moments_of(texts: Any) -> Moments | str | None:
 
     None if it holds something else, a text with the reason where its times cannot be told.
     """
+    found = _iso(texts) if _ISO.fullmatch(texts.iloc[0]) else None
+    if found is not None:
+        return found
     for form, kind in _FORMS:
         if form.fullmatch(texts.iloc[0]):
             parts = texts.str.extract(re.compile(f"^(?:{form.pattern})$", form.flags))
@@ -62,6 +69,23 @@ def moments_of(texts: Any) -> Moments | str | None:
                 continue
             return _times_of_day(parts) if kind == "time of day" else _moments(parts)
     return None
+
+
+def _iso(texts: Any) -> Moments | None:
+    """The usual form, which pandas reads several times as fast; None where there is any doubt."""
+    import pandas as pd
+
+    has_time = texts.str.contains(":", regex=False)
+    zoned = texts.str.contains(r"(?:Z|[-+]\d{2}:?\d{2})$")
+    if has_time.nunique() > 1 or zoned.nunique() > 1:
+        return None
+    try:
+        found = pd.to_datetime(texts, utc=True, format="ISO8601")
+    except (ValueError, OverflowError):
+        return None
+    ns = found.dt.tz_localize(None).to_numpy("datetime64[ns]").view(np.int64)
+    notes = [] if zoned.iloc[0] else [_NO_ZONE]
+    return Moments(ns, "moment" if has_time.iloc[0] else "date", notes)
 
 
 def _moments(parts: Any) -> Moments | str:
@@ -88,7 +112,7 @@ def _moments(parts: Any) -> Moments | str:
     if isinstance(zone, str):
         return zone
     if zone is None:
-        notes.append("has no time zone and was taken as UTC")
+        notes.append(_NO_ZONE)
         zone = np.zeros(1, np.int64)
     return Moments(ns - zone, "moment" if has_time else "date", notes)
 
