@@ -197,9 +197,12 @@ def _provenance(file: Path, role: str = "file") -> dict[str, str]:
 def _whole_outcome(file: Path, path: Path, output: Path | None, report: "Report") -> Outcome:
     from seamlog.session import open_session
 
+    from .session_columns import unreadable
+
     with open_session(path) as session:
         info = session.info
         rows = {channel.topic: channel.count for channel in info.channels.values()}
+        report.losses += unreadable(session)
     head = f"{file} -> {output}" if output else f"{file}: dry run, nothing written"
     when = f", {info.duration_s:.3f} s from {_date(info.start_ns)}" if info.message_count else ""
     lines = [head, f"{info.message_count} messages{when}"]

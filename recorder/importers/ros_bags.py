@@ -1,10 +1,7 @@
 """ROS bags: every topic is taken over as it is, with its message definition."""
 
-import re
-import tempfile
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +9,14 @@ from seamlog.errors import HardwareError, ImportFailed, SessionError
 from seamlog.mcap.batch import BatchWriter
 from seamlog.mcap.file import McapFile
 from seamlog.mcap.records import Schema
+from seamlog.mcap.rows import iter_batches
 from seamlog.mcap.streams import MessageStream
 
 from .content import Report
+from .ros_definitions import completed, own_packages, schema_of
+from .ros_files import counts_of, files_of, is_compressed_by_message, plain
 
-_PATHS = re.compile(r"relative_file_paths:\s*\n((?:\s+- .*\n?)+)")
-_COUNTS = re.compile(r"- path: (?P<path>.*)\n(?:.*\n){1,6}?\s+message_count: (?P<count>\d+)")
 _HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
-_BAG_FILES = (".mcap", ".db3", ".zstd")
 
 
 class Ros2Importer:
@@ -31,17 +28,23 @@ class Ros2Importer:
     def write(self, path: Path, writer: BatchWriter) -> Report:
         """Copy all messages into `writer`; what was lost or had to be decided."""
         report = Report()
-        files = _files(path, report)
-        message_mode = _is_compressed_by_message(path)
-        streams = _Streams(writer, report)
+        files = files_of(path, report)
+        counts = counts_of(path if path.is_dir() else path.parent)
+        streams = _Streams(writer, report, is_compressed_by_message(path))
         read = 0
         for file in files:
-            with _plain(file) as plain:
-                if plain.suffix == ".mcap":
-                    read += _copy_mcap(plain, writer, report)
-                else:
-                    streams.copy_sqlite(plain, file, message_mode)
-                    read += 1
+            with plain(file, report) as unpacked:
+                copy = streams.copy_mcap if unpacked.suffix == ".mcap" else streams.copy_sqlite
+                count = copy(unpacked, file)
+            if count is None:
+                continue
+            read += 1
+            lost = counts.get(file.name, 0) - count
+            if lost > 0:
+                report.losses.append(
+                    f"{file.name}: metadata.yaml counts {counts[file.name]} messages, {lost} more "
+                    "than were found"
+                )
         streams.finish()
         if not read:
             why = "; ".join(report.losses)
@@ -70,13 +73,16 @@ class Ros1Importer:
                 for connection, time, raw in reader.messages():
                     name = connection.msgtype
                     payload = bytes(store.ros1_to_cdr(raw, name))
-                    stream = streams.of(connection, lambda name=name: _schema(name, store))
+                    stream = streams.of(connection, lambda name=name: schema_of(name, store))
                     if stream is not None:
                         stream.put(time, payload)
         except (ImportFailed, OSError):
             raise
         except Exception as error:
-            raise ImportFailed(f"{path} cannot be read as a ROS 1 bag: {error}") from error
+            raise ImportFailed(
+                f"{path} cannot be read as a ROS 1 bag: {error}; if it was not closed or is cut, "
+                "let ROS write its index anew first: rosbag reindex"
+            ) from error
         streams.finish()
         return report
 
@@ -84,8 +90,8 @@ class Ros1Importer:
 class _Streams:
     """Message streams by connection, and what had to be left out."""
 
-    def __init__(self, writer: BatchWriter, report: Report) -> None:
-        self._writer, self._report = writer, report
+    def __init__(self, writer: BatchWriter, report: Report, by_message: bool = False) -> None:
+        self._writer, self._report, self._by_message = writer, report, by_message
         self._found: dict[tuple[str, str], MessageStream | None] = {}
         self._lost: Counter[tuple[str, str]] = Counter()
 
@@ -99,39 +105,87 @@ class _Streams:
             self._lost[key] += 1
         return self._found[key]
 
-    def copy_sqlite(self, path: Path, origin: Path, message_mode: bool) -> None:
-        """Copy the messages of one SQLite file."""
-        rosbag2 = _rosbags("rosbag2", origin)
+    @property
+    def _unpack(self) -> Callable[[Any], bytes]:
         import zstandard
 
-        unpack = zstandard.ZstdDecompressor().decompress if message_mode else bytes
+        return zstandard.ZstdDecompressor().decompress if self._by_message else bytes
+
+    def copy_sqlite(self, path: Path, origin: Path) -> int | None:
+        """Copy the messages of one SQLite file; how many it has."""
+        rosbag2 = _rosbags("rosbag2", origin)
+        unpack, count = self._unpack, 0
         try:
             with rosbag2.Reader(path) as reader:
                 for connection, time, raw in reader.messages():
                     stream = self.of(connection, lambda c=connection: self._schema(c))
+                    count += 1
                     if stream is not None:
                         stream.put(time, unpack(raw))
         except Exception as error:
             if not any(self._found.values()):
-                raise ImportFailed(f"{origin} cannot be read as a ROS 2 bag: {error}") from error
+                raise ImportFailed(
+                    f"{origin} cannot be read as a ROS 2 bag: {error}; a cut or damaged database "
+                    f"may be saved by: sqlite3 {origin.name} .recover | sqlite3 whole.db3"
+                ) from error
             self._report.losses.append(f"{origin.name}: reading stopped at a fault: {error}")
+        return count
+
+    def copy_mcap(self, path: Path, origin: Path) -> int | None:
+        """Copy the messages of one MCAP file; how many it has, None if it cannot be read."""
+        try:
+            file = McapFile(path)
+        except SessionError as error:
+            self._report.losses.append(str(error))
+            return None
+        try:
+            schemas = {row.id: self._completed(file, row) for row in file.index.channels.values()}
+            changed = [row for row in schemas if schemas[row] is not _own(file, row)]
+            if changed or self._by_message:
+                count = self._copy_messages(file, schemas)
+            else:
+                self._writer.copy_file(file)
+                count = sum(file.index.statistics.channel_counts.values())
+            self._report.losses += file.problems
+        finally:
+            file.close()
+        return count
+
+    def _completed(self, file: McapFile, row: Any) -> Schema | None:
+        schema, added = completed(_own(file, row.id), row.message_encoding)
+        if added:
+            self._note_added(row.topic, added)
+        return schema
+
+    def _copy_messages(self, file: McapFile, schemas: dict[int, Schema | None]) -> int:
+        unpack, count = self._unpack, 0
+        for row in file.index.channels.values():
+            schema = schemas[row.id]
+            stream = self._writer.stream(row.topic, schema, row.message_encoding, row.metadata)
+            for batch in iter_batches(file.iter_chunks(file.entries(row.id)), row.id):
+                for time, payload in batch.payloads():
+                    stream.put(time, unpack(payload))
+                    count += 1
+        return count
 
     def _schema(self, connection: Any) -> Schema | None:
         from rosbags.interfaces import MessageDefinitionFormat as Format
-        from rosbags.typesys import Stores, get_typestore
 
         definition = connection.msgdef
         if definition.format != Format.NONE and definition.data:
             encoding = "ros2msg" if definition.format == Format.MSG else "ros2idl"
             return Schema(0, connection.msgtype, encoding, definition.data.encode())
-        store = get_typestore(Stores.LATEST)
+        store = own_packages()
         if connection.msgtype not in store.types:
             return None
+        self._note_added(connection.topic, f"the definition of {connection.msgtype}")
+        return schema_of(connection.msgtype, store)
+
+    def _note_added(self, topic: str, added: str) -> None:
         self._report.notes.append(
-            f"{connection.topic}: the bag has no definition of {connection.msgtype}; the one of "
-            "ROS 2's own packages, as rosbags knows it, was taken"
+            f"{topic}: the bag lacks {added}; that of ROS 2's own packages, as rosbags knows it, "
+            "was taken"
         )
-        return _schema(connection.msgtype, store)
 
     def finish(self) -> None:
         """Note what was left out."""
@@ -139,11 +193,6 @@ class _Streams:
             self._report.losses.append(
                 f"{topic}: {count} messages were left out: the bag has no definition of {name}"
             )
-
-
-def _schema(name: str, store: Any) -> Schema:
-    text, _ = store.generate_msgdef(name, ros_version=2)
-    return Schema(0, name, "ros2msg", text.encode())
 
 
 def _rosbags(module: str, path: Path) -> Any:
@@ -157,85 +206,5 @@ def _rosbags(module: str, path: Path) -> Any:
         ) from error
 
 
-def _files(path: Path, report: Report) -> list[Path]:
-    """Files of the bag in order; missing ones are losses."""
-    if path.is_file():
-        report.notes += _beside(path)
-        return [path]
-    listing = path / "metadata.yaml"
-    if not listing.is_file():
-        found = sorted(item for item in path.iterdir() if item.suffix in _BAG_FILES)
-        if not found:
-            raise ImportFailed(f"{path} is no ROS bag: no metadata.yaml, no .mcap or .db3 file")
-        report.notes.append(
-            f"{path.name} has no metadata.yaml: nothing tells whether parts are missing"
-        )
-        return found
-    text = listing.read_text(encoding="utf-8", errors="replace")
-    match = _PATHS.search(text)
-    if match is None:
-        raise ImportFailed(f"{listing} lists no files; it is no metadata of a ROS 2 bag")
-    names = [_file_name(line) for line in match[1].splitlines() if line.strip()]
-    counts = {_file_name(row["path"]): row["count"] for row in _COUNTS.finditer(text)}
-    report.losses += [
-        f"{name} is missing" + (f": {counts[name]} messages" if name in counts else "")
-        for name in names
-        if not (path / name).is_file()
-    ]
-    return [path / name for name in names if (path / name).is_file()]
-
-
-def _beside(path: Path) -> list[str]:
-    """A note if a bag's metadata names more files than the one that was asked for."""
-    listing = path.parent / "metadata.yaml"
-    if not listing.is_file():
-        return []
-    match = _PATHS.search(listing.read_text(encoding="utf-8", errors="replace"))
-    names = [_file_name(line) for line in match[1].splitlines() if line.strip()] if match else []
-    if path.name not in names or len(names) < 2:
-        return []
-    return [f"{path.name} is one of {len(names)} files of a bag; name its folder to import all"]
-
-
-def _file_name(line: str) -> str:
-    return Path(line.strip().removeprefix("- ").strip("\"' ")).name
-
-
-def _is_compressed_by_message(path: Path) -> bool:
-    folder = path if path.is_dir() else path.parent
-    with suppress(OSError):
-        text = (folder / "metadata.yaml").read_text(encoding="utf-8", errors="replace")
-        return bool(re.search(r"compression_mode:\s*[\"']?message", text, re.IGNORECASE))
-    return False
-
-
-@contextmanager
-def _plain(file: Path) -> Iterator[Path]:
-    """The file itself, or what is packed in a `.zstd` file."""
-    if file.suffix != ".zstd":
-        yield file
-        return
-    import zstandard
-
-    with tempfile.TemporaryDirectory() as folder:
-        plain = Path(folder) / file.stem
-        try:
-            with file.open("rb") as packed, plain.open("wb") as unpacked:
-                zstandard.ZstdDecompressor().copy_stream(packed, unpacked)
-        except zstandard.ZstdError as error:
-            raise ImportFailed(f"{file} cannot be unpacked: {error}") from error
-        yield plain
-
-
-def _copy_mcap(path: Path, writer: BatchWriter, report: Report) -> bool:
-    try:
-        file = McapFile(path)
-    except SessionError as error:
-        report.losses.append(str(error))
-        return False
-    try:
-        writer.copy_file(file)
-        report.losses += file.problems
-    finally:
-        file.close()
-    return True
+def _own(file: McapFile, channel_id: int) -> Schema | None:
+    return file.index.schemas.get(file.index.channels[channel_id].schema_id)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seamlog.errors import SeamlogError
 from seamlog.session import Session
 
 from .content import Content
@@ -71,3 +72,16 @@ def content_of_session(session: Session) -> Content:
     """All numeric columns of a session's topics."""
     columns = SessionColumns(session)
     return Content(columns, times=columns.times())
+
+
+def unreadable(session: Session) -> Iterator[str]:
+    """Topics whose first messages cannot be read as columns, with the reason."""
+    for topic, row in session.info.channels.items():
+        if not row.count:
+            continue
+        first = session.info.start_ns if row.start_ns is None else row.start_ns
+        try:
+            session.window(first, first + 1).columns(topic)
+        except SeamlogError as error:
+            reason = str(error).partition(f"{topic}: ")[2] or str(error)
+            yield f"{topic}: its {row.count} messages were copied but cannot be read: {reason}"

@@ -29,7 +29,7 @@ def json(schema: Schema | None) -> Any:
 
 def fields_of(schema: Schema | None) -> tuple[Node, ...]:
     """Fields of a message by its definition; `Malformed` if that cannot be read."""
-    if schema is None or not schema.data:
+    if schema is None or not (schema.data or schema.name.endswith("/Empty")):
         raise Malformed(
             "its channel has no message definition, so its bytes cannot be told apart; "
             "record or convert it with definitions"

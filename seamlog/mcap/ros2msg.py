@@ -93,6 +93,10 @@ def _node(line: str, owner: str, definitions: dict[str, str], depth: int) -> Nod
     base, name, count = match["base"], match["name"], _count(match["array"])
     if base in PRIMITIVES or base == "string":
         return Node(name, base, count)
+    if base == "wstring":
+        raise DefinitionError(
+            f"{owner}: {name} is a wstring, which middlewares write in different widths"
+        )
     found = _resolve(base, owner, definitions)
     return Node(name, found, count, _fields(found, definitions, depth + 1))
 
