@@ -45,13 +45,13 @@ class Gate:
         self._foreign = threading.Lock()
 
     def new_limit(self, number: int) -> int:
-        """How many messages a fixed ring has room for in all, -1 after the end.
+        """How many messages a fixed ring has room for in all.
 
         Waits for room for message `number` where the source is simulated.
         """
         words, slots = self.ring.words, self.ring.slots
         self.has_room(lambda: number < words[TAIL] + slots)
-        return int(words[TAIL]) + slots if self.is_open else -1
+        return int(words[TAIL]) + slots
 
     def has_room(self, fits: Callable[[], bool]) -> bool:
         """True once `fits` is; waits for it where the source is simulated."""

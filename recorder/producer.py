@@ -19,10 +19,16 @@ from .accounts import Account, ring_account
 from .channel import Channel, known_row, make_channel, producer_name
 from .folder import OutTray, Recording
 from .gate import Gate
-from .put_source import PutNamed
 from .ring import TAKEN_IN, Ring
 
 _INTAKE_S = 2.0
+
+
+class _Own(threading.local):
+    """The channels of each thread, by topic."""
+
+    def __init__(self) -> None:
+        self.channels: dict[str, Channel] = {}
 
 
 class Producer(ABC):
@@ -34,7 +40,7 @@ class Producer(ABC):
         self._recording = recording
         self._tray = tray
         self._channels: dict[tuple[str, int], Channel] = {}
-        self._mine = threading.local()
+        self._mine = _Own()
         self._strangers: dict[str, str] = {}
 
     def channel(self, topic: str, metadata: Mapping[str, str] | None = None) -> Channel:
@@ -51,27 +57,27 @@ class Producer(ABC):
         extra = {k: v for k, v in (metadata or {}).items() if found.metadata.get(k) != v}
         if extra:
             raise UsageError(f"{topic} is being recorded already, without {extra}")
+        self._mine.channels[topic] = found
         return found
 
     def log(self, topic: str, stamp_ns: int | None = None, **fields: Any) -> bool:
         """Log one message by field names; False if it was not accepted."""
-        try:
-            put: PutNamed = self._mine.puts[topic]
-        except (AttributeError, KeyError):
-            put = self._late_put(topic)
+        channel = self._mine.channels.get(topic) or self._late_channel(topic)
+        if channel is None:
+            return self._turn_away(topic)
         if stamp_ns is None:
             stamp_ns = self.clock.now_ns()
         try:
-            return put(stamp_ns, fields)
+            return channel.put_named(stamp_ns, fields)
         except TypeError:
-            return self._channels[topic, get_ident()].refuse_names(fields)
+            return channel.refuse_names(fields)
 
     def log_frame(self, topic: str, image: NDArray[Any], stamp_ns: int | None = None) -> bool:
         """Log a picture, uint8, shape (rows, columns) grey or (rows, columns, 3) BGR.
 
         The loop pays one copy; the recorder process makes a JPEG of it.
         """
-        channel = self._channels.get((topic, get_ident())) or self._late_channel(topic)
+        channel = self._mine.channels.get(topic) or self._late_channel(topic)
         if channel is None:
             return self._turn_away(topic)
         return channel.put_frame(self.clock.now_ns() if stamp_ns is None else stamp_ns, image)
@@ -135,6 +141,7 @@ class Producer(ABC):
             bare = make_channel(key[0], named, self._tray, self.clock, self._gate, number)
             made = self._fitted(bare)
             self._channels[key] = made
+            self._mine.channels[key[0]] = made
         self._await_intake(made.gate.ring)
         return made
 
@@ -149,13 +156,6 @@ class Producer(ABC):
     def _gate(self, topic: str, ring: Ring) -> Gate:
         waits = self._recording.pace == "simulated"
         return Gate(topic, ring, waits, self.strict, self._is_alive)
-
-    def _late_put(self, topic: str) -> PutNamed:
-        channel = self._late_channel(topic)
-        if channel is None:
-            return lambda *_: self._turn_away(topic)
-        self._mine.__dict__.setdefault("puts", {})[topic] = channel.put_named
-        return channel.put_named
 
     def _late_channel(self, topic: str) -> Channel | None:
         try:

@@ -33,7 +33,8 @@ def make(pack_into, data, words, slots, stride, now, anchor, owner, gate):
             if rest:
                 return gate.refuse_values((stamp_ns, {names}, *rest), "too many values")
             limit = gate.new_limit(number)
-            if limit < 0:
+            if not gate.is_open:
+                limit = -1
                 return gate.refuse_closed()
             if number >= limit:
                 gaps += 1

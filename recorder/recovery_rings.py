@@ -156,7 +156,9 @@ def _feed(folder: Path, item: dict[str, Any], file: RecoveredFile) -> Feed:
 def _final(feed: Feed, missing: int, in_snapshots: bool) -> Account:
     """Accepted = written + lost; with all rings drained, what is not lost has been written."""
     ring = feed.ring
-    account = ring_account(feed.topic, feed.account().producer, ring, ring.accepted)
+    seen = feed.account()
+    # A loop may die between publishing a message and counting it.
+    account = ring_account(feed.topic, seen.producer, ring, max(ring.accepted, seen.accepted))
     lost = account.lost + max(0, missing - account.dropped - account.discarded)
     if in_snapshots:
         # What waited in the memory of the recorder process belonged to no snapshot yet.

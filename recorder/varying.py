@@ -6,7 +6,6 @@ from threading import get_ident
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seamlog.clock import Clock
 from seamlog.mcap.records import Buffer
@@ -32,8 +31,6 @@ RAW_HEAD = struct.Struct("<BQIQQIIB")
 _STAMPS = 1 << 63
 _SEQUENCES = 1 << 32
 _LARGEST_PX = 65_500
-_LARGE_BYTES = 64 << 10
-_UINT8 = np.dtype(np.uint8)
 
 
 class VaryingWriter:
@@ -42,8 +39,7 @@ class VaryingWriter:
     `share` is the part of the ring it may fill, half of it with one message (so that one fits
     into an empty ring wherever that begins again).
 
-    The store of `head` publishes a message. What is known besides follows from it, so that an
-    interrupt between any two instructions leaves nothing to repair but `_known`, see `_place`.
+    A picture comes each 30 ms into a cold cache: what its call touches is what it costs.
     """
 
     __slots__ = (
@@ -54,12 +50,12 @@ class VaryingWriter:
         "_gaps",
         "_gate",
         "_known",
+        "_limit",
         "_now",
         "_owner",
+        "_picture",
         "_ring",
-        "_shape",
         "_share",
-        "_views",
         "_words",
     )
 
@@ -73,27 +69,28 @@ class VaryingWriter:
         self._channel_id = channel_id
         self._now, self._anchor = log_time_parts(clock)
         self._encode = encode
-        self._share = int(ring.capacity * share)
+        self._share = self._limit = int(ring.capacity * share)
+        """`_limit` is how far `head` may go as far as is known; -1 after the end."""
         self._known = (0, 0)
         """`head` and the count of messages up to there."""
         self._gaps = 0
-        self._shape: tuple[int, ...] = ()
-        self._views: dict[int, NDArray[np.uint8]] = {}
+        self._picture: tuple[tuple[int, ...], tuple[int, int, int]] = ((), (0, 0, 0))
+        """Shape of the last picture, and its rows, columns, samples per pixel."""
 
     def put(self, stamp_ns: int, *values: Any) -> bool:
         """Log one message, values in the table's order."""
         if get_ident() != self._owner:
             return self._gate.refuse_foreign()
         try:
-            time_ns = self._now() + self._anchor
-            _check_times(stamp_ns, time_ns)
+            time_ns = self._time_ns(stamp_ns)
             start, rest = self._encode(stamp_ns, *values)
             size = RECORD.size + len(start) + len(rest)
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
-        at = self._place(size)
-        if at < 0:
+        end = self._place(size)
+        if end < 0:
             return False
+        at = (end - size) % self._ring.capacity
         number = (self._known[1] + self._gaps) % _SEQUENCES
         length = size - RECORD_HEAD_BYTES
         RECORD.pack_into(
@@ -102,104 +99,92 @@ class VaryingWriter:
         body = at + RECORD.size + len(start)
         self._data[at + RECORD.size : body] = start
         self._data[body : at + size] = rest
-        return self._publish(at, size)
+        return self._publish(end)
 
     def put_frame(self, stamp_ns: int, image: Any) -> bool:
         """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""
         if get_ident() != self._owner:
             return self._gate.refuse_foreign()
         try:
-            time_ns = self._now() + self._anchor
-            _check_times(stamp_ns, time_ns)
-            if image.__class__ is not np.ndarray:
-                image = np.asarray(memoryview(image))
-            if image.dtype != _UINT8:
-                _check_picture(image)
-            shape = image.shape
-            if shape != self._shape:
-                _check_picture(image)
-                self._shape, self._views = shape, {}
+            time_ns = self._time_ns(stamp_ns)
+            pixels = memoryview(image)
+            shape, form = self._picture
+            if pixels.shape != shape or pixels.format != "B":
+                form = _form_of(pixels)
+                self._picture = pixels.shape or (), form
+            size = RAW_HEAD.size + pixels.nbytes
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
-        size = RAW_HEAD.size + image.size
-        at = self._place(size)
-        if at < 0:
+        end = self._place(size)
+        if end < 0:
             return False
+        at = (end - size) % self._ring.capacity
         number = (self._known[1] + self._gaps) % _SEQUENCES
         length = size - RECORD_HEAD_BYTES
-        form = shape if len(shape) == 3 else (*shape, 1)
         RAW_HEAD.pack_into(self._data, at, RAW_FRAME, length, number, time_ns, stamp_ns, *form)
-        view = self._views.get(at)
-        if view is None:
-            view = self._view(at, image.size)
-        view[...] = image
-        return self._publish(at, size)
+        if pixels.c_contiguous:
+            self._data[at + RAW_HEAD.size : at + size] = pixels.cast("B")
+        else:
+            room = np.frombuffer(self._data, np.uint8, pixels.nbytes, at + RAW_HEAD.size)
+            room.reshape(pixels.shape or ())[...] = pixels
+        return self._publish(end)
 
     def stop(self) -> None:
         """Take nothing more; the gate is closed already."""
+        self._limit = -1
 
-    def _view(self, at: int, size: int) -> NDArray[np.uint8]:
-        """Where the pixels of a record at `at` go; kept, as a ring comes round again and again."""
-        pixels = np.frombuffer(self._data, np.uint8, size, at + RAW_HEAD.size)
-        view = pixels.reshape(self._shape)
-        if size >= _LARGE_BYTES:
-            self._views[at] = view
-        return view
+    def _time_ns(self, stamp_ns: int) -> int:
+        """Log time now; `ValueError` if it or the stamp is none."""
+        time_ns = self._now() + self._anchor
+        if not 0 <= stamp_ns.__index__() < _STAMPS:
+            raise ValueError(f"stamp_ns must be from 0 to 2**63 - 1, got {stamp_ns}")
+        if not 0 <= time_ns.__index__() < _STAMPS:
+            raise ValueError(f"the clock must tell from 0 to 2**63 - 1 ns, it tells {time_ns}")
+        return time_ns
 
     def _place(self, size: int) -> int:
-        """Offset for a record of `size` bytes, -1 if it was turned away."""
-        head, accepted = self._known
-        if self._words[HEAD] != head:
-            # An interrupt came between publishing a message and counting it.
-            head = self._count(int(self._words[HEAD]), accepted + 1)
-        if size > self._share // 2:
-            self._gate.refuse(f"the message has {size} bytes, one may have {self._share // 2}")
+        """`head` behind a record of `size` bytes, -1 if it was turned away."""
+        head, capacity = self._known[0], self._ring.capacity
+        rest = capacity - head % capacity
+        end = head + size if size <= rest else head + rest + size
+        if (end > self._limit or size > self._share // 2) and not self._makes_room(size, end):
             return -1
-        at = head % self._ring.capacity
-        rest = self._ring.capacity - at
-        end = head + size + (rest if rest < size else 0)
-        fits = self._gate.is_open and end - self._words[TAIL] <= self._share
-        if not (fits or self._gate.has_room(lambda: end - self._words[TAIL] <= self._share)):
-            return self._turn_away()
-        if rest >= size:
-            return at
-        self._data[at] = SKIP
-        return 0
+        if size > rest:
+            self._data[capacity - rest] = SKIP
+        return end
 
-    def _turn_away(self) -> int:
-        if not self._gate.is_open:
-            self._gate.refuse_closed()
-            return -1
-        self._gaps += 1
-        self._gate.drop(self._known[1] + self._gaps - 1)
-        return -1
-
-    def _publish(self, at: int, size: int) -> bool:
-        head, accepted = self._known
-        end = head + size + (-head % self._ring.capacity if at == 0 else 0)
-        self._words[HEAD] = end
-        self._count(end, accepted + 1)
+    def _makes_room(self, size: int, end: int) -> bool:
+        """Look again how far `head` may go; turns away what has no room."""
+        gate, words, share = self._gate, self._words, self._share
+        if size > share // 2:
+            return gate.refuse(f"the message has {size} bytes, one may have {share // 2}")
+        has_room = gate.has_room(lambda: end - words[TAIL] <= share)
+        self._limit = words[TAIL] + share
+        if not gate.is_open:
+            self._limit = -1
+            return gate.refuse_closed()
+        if not has_room:
+            self._gaps += 1
+            return gate.drop(self._known[1] + self._gaps - 1)
         return True
 
-    def _count(self, head: int, accepted: int) -> int:
+    def _publish(self, end: int) -> bool:
+        """An interrupt before `HEAD` is stored leaves the message to be published by the next."""
+        accepted = self._known[1] + 1
+        self._known = end, accepted
+        self._words[HEAD] = end
         self._words[ACCEPTED] = accepted
-        self._known = (head, accepted)
-        return head
+        return True
 
 
-def _check_times(stamp_ns: int, log_time_ns: int) -> None:
-    if not 0 <= stamp_ns.__index__() < _STAMPS:
-        raise ValueError(f"stamp_ns must be from 0 to 2**63 - 1, got {stamp_ns}")
-    if not 0 <= log_time_ns.__index__() < _STAMPS:
-        raise ValueError(f"the clock must tell from 0 to 2**63 - 1 ns, it tells {log_time_ns}")
-
-
-def _check_picture(image: NDArray[Any]) -> None:
-    form = image.shape
-    if image.dtype != _UINT8 or len(form) not in (2, 3) or 0 in form or form[2:] not in ((), (3,)):
+def _form_of(pixels: memoryview) -> tuple[int, int, int]:
+    """Rows, columns and samples per pixel; `ValueError` if these are no pixels of a picture."""
+    form = pixels.shape or ()
+    if pixels.format != "B" or len(form) not in (2, 3) or 0 in form or form[2:] not in ((), (3,)):
         raise ValueError(
             "a picture is uint8 of shape (rows, columns) or (rows, columns, 3), got "
-            f"{image.dtype} of shape {form}"
+            f"format {pixels.format!r} of shape {form}"
         )
     if max(form) > _LARGEST_PX:
         raise ValueError(f"a picture of {form[1]} x {form[0]} px is larger than JPEG allows")
+    return form[0], form[1], 3 if form[2:] else 1

@@ -7,7 +7,7 @@ counted from behind that header (OMG DDSI-RTPS 2.5, section 10).
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from seamlog.channels import CAMERA_INFO_SCHEMA, CHANNELS, IMAGE_SCHEMA, Channel
@@ -34,6 +34,7 @@ PRIMITIVES = {
 
 TIME = "builtin_interfaces/Time"
 
+_IMAGE_FRONT, _IMAGE_SIZE = struct.Struct("<IiI"), struct.Struct("<I")
 _SEPARATOR = "=" * 80
 _HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
 _TIME = "int32 sec\nuint32 nanosec\n"
@@ -209,8 +210,15 @@ def encode_image(stamp_ns: int, frame_id: str, image_format: str, data: bytes) -
 
 def image_head(stamp_ns: int, frame_id: str, image_format: str, size: int) -> bytes:
     """What stands in front of the `size` bytes of the picture in a CompressedImage payload."""
+    names = _image_names(frame_id, image_format)
+    front = _IMAGE_FRONT.pack(CDR_HEADER_INT, *divmod(stamp_ns, 1_000_000_000))
+    return front + names + _IMAGE_SIZE.pack(size)
+
+
+@lru_cache(64)
+def _image_names(frame_id: str, image_format: str) -> bytes:
+    """The two strings behind the stamp, up to where the size stands."""
     writer = CdrWriter()
-    kinds = (TIME, "string", "string", "uint32")
-    for kind, value in zip(kinds, (stamp_ns, frame_id, image_format, size), strict=True):
+    for kind, value in ((TIME, 0), ("string", frame_id), ("string", image_format), ("uint32", 0)):
         writer.put(kind, value)
-    return writer.payload()
+    return writer.payload()[_IMAGE_FRONT.size : -_IMAGE_SIZE.size]
