@@ -34,7 +34,7 @@ from seamlog.channels import CHANNELS, STAMP, Channel
 from seamlog.channels import Field as ChannelField
 from seamlog.errors import ConfigError, InputError
 
-from .units import factor_between, is_unit, spelled
+from .units import factor_between, spelled
 
 TimeUnit = Literal["s", "ms", "us", "ns", "min", "h", "d", "datenum"]
 
@@ -150,7 +150,7 @@ def _state_units(tree: dict[str, Any], units: Mapping[str, str]) -> None:
             continue
         unit = units.get(str(value.get("column")))
         free = topic.startswith(FREE)
-        if unit and (free or (is_unit(unit) and _wants_unit(topic, name))):
+        if unit and (free or _wants_unit(topic, name)):
             value["unit"] = unit if free else spelled(unit)
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .conversion import Loss, TopicColumns
 
 BY_SUFFIX = {
-    "csv": "csv txt tsv dat asc",
+    "csv": "csv txt tsv dat asc lvm",
     "mat": "mat",
     "parquet": "parquet pq",
     "tdms": "tdms",

@@ -13,8 +13,10 @@ from seamlog.errors import ImportFailed
 
 from .content import Content
 from .csv_cells import Numbers, cleaned, numbers_of
-from .csv_layout import Layout, decode, layout_of
+from .csv_layout import Layout, layout_of
+from .csv_text import decode
 from .moments import DAY_NS, Moments, moments_of, past_midnight
+from .units import is_unit
 
 _TOO_WIDE = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
 
@@ -137,12 +139,14 @@ class _Reader:
     def __init__(self, layout: Layout, content: Content) -> None:
         self._layout, self._content = layout, content
         self._moments: dict[str, Moments] = {}
+        self._names: list[str] = []
 
     def column(self, column: Any, name: str) -> NDArray[Any] | None:
         """Numbers, or ns; None for an empty column, or one of text."""
         import pandas as pd
 
         content = self._content
+        self._names.append(name)
         if name in self._layout.units:
             content.units[name] = self._layout.units[name]
         if pd.api.types.is_bool_dtype(column):
@@ -159,6 +163,8 @@ class _Reader:
             self._moments[name] = moments
             is_time = moments.kind == "time of day"
             return past_midnight(moments.ns) if is_time else moments.ns
+        if self._is_unit_of_last(column):
+            return None
         reason = found or moments
         content.notes.append(
             f"column {name!r}: {reason}; it was not imported"
@@ -166,6 +172,14 @@ class _Reader:
             else f"column {name!r} holds text and was not imported"
         )
         return None
+
+    def _is_unit_of_last(self, column: Any) -> bool:
+        """Whether a column holds but the unit of the one before it, which then has it."""
+        cells = set(cleaned(column)) - {""}
+        if len(cells) != 1 or not is_unit(unit := cells.pop()) or len(self._names) < 2:
+            return False
+        self._content.units.setdefault(self._names[-2], unit)
+        return True
 
     def _told(self, found: Numbers, column: Any, name: str) -> NDArray[Any]:
         if found.unit:

@@ -30,12 +30,12 @@ _RULES = (
         "command",
         r"^vir$|^u$|torque|control|(motor|drive|servo|output).*(curr|volt|com)|^command$",
     ),
-    ("/weld/process", "current_a", r"(weld|arc|strom).*curr|^curr|amp|strom|_i$|^i$"),
+    ("/weld/process", "current_a", r"(weld|arc|strom).*curr|^curr|(^|_)amp|strom|_i$|^i$"),
     ("/weld/process", "voltage_v", r"(weld|arc).*volt|^volt|spannung|^v$|_u$"),
     ("/weld/process", "wire_feedrate_m_min", r"wire|wfs|draht|feed_?rate"),
 )
 _TIME = re.compile(
-    r"^(t|time|timestamp|time_?stamp|zeit|datum|date|datetime|elapsed|seconds|sec|ms|us|unix.*)\b|time$|_t$",
+    r"^(t|time|x_value|x_axis|timestamp|time_?stamp|zeit|datum|date|datetime|elapsed|seconds|sec|ms|us|unix.*)\b|time$|_t$",
     re.I,
 )
 _UNIT_AT_END = re.compile(
@@ -68,13 +68,13 @@ def guess(content: Content, path: Path) -> str:
 
 def _bare(name: str) -> str:
     """The name without group, unit and case, words joined by _."""
-    tail = re.sub(r"[\[(].*?[\])]", "", _without_unit(name).rpartition("/")[2])
+    tail = re.sub(r"[\[(].*?[\])]", "", _without_unit(name)).rpartition("/")[2]
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|[\s.\-]+", "_", tail).strip("_").lower()
 
 
 def _without_unit(name: str) -> str:
-    """`Weg` of `Weg / mm`; groups have no blanks around their slash."""
-    return re.sub(r"(\s+[/,]\s*|,\s*| in )[^\s,]+$", "", name)
+    """`Weg` of `Weg / mm` and `Weg [m/min]`; groups have no blanks around their slash."""
+    return re.sub(r"(\s+[/,]\s*|,\s*| in )[^\s,]+$|\s*[\[(][^\[\]()]*[\])]\s*$", "", name)
 
 
 def _time_column(columns: Mapping[str, NDArray[Any]], content: Content) -> str | None:
@@ -166,6 +166,8 @@ def _unit_of(name: str, wanted: str, content: Content) -> tuple[str | None, str]
         unit = unit or text.replace("_min", "/min").replace("_s2", "/s^2").replace("_s", "/s")
         if factor_between(unit, wanted) is not None:
             return unit, "unit guessed from the name"
+    if stated:
+        return None, f"the file's unit {stated!r} is not known: give scale or unit"
     return None, f"no unit found: taken as {wanted}, CHECK"
 
 

@@ -32,7 +32,23 @@ _NO_ZONE = "has no time zone and was taken as UTC"
 _ISO = re.compile(
     r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)?(?:Z|[-+]\d{2}:?\d{2})?"
 )
+_CLOCK_APART = r"(?P<h>\d{2})[-._](?P<min>\d{2})[-._](?P<s>\d{2})(?:[.,](?P<f>\d{1,12}))?"
+_CLOCK_BARE = r"(?P<h>\d{2})(?P<min>\d{2})(?P<s>\d{2})(?:[.,](?P<f>\d{1,12}))?"
 _FORMS = (
+    (
+        re.compile(rf"(?P<y>\d{{4}})(?P<mon>\d\d)(?P<d>\d\d)[T _-]{_CLOCK_BARE}{_ZONE}", re.I),
+        "moment",
+    ),
+    (
+        re.compile(rf"(?P<y>\d{{4}})-(?P<mon>\d\d)-(?P<d>\d\d)[T _-]{_CLOCK_APART}{_ZONE}", re.I),
+        "moment",
+    ),
+    (
+        re.compile(
+            rf"[A-Z]{{3}} (?P<name>[A-Z]{{3}}) +(?P<d>\d+) {_TIME}{_ZONE} (?P<y>\d{{4}})", re.I
+        ),
+        "moment",
+    ),
     *((re.compile(rf"{date}(?:,?[T ]\s*{_TIME})?{_ZONE}", re.I), "moment") for date in _DATES),
     (re.compile(_TIME + _ZONE, re.I), "time of day"),
     (re.compile(_SHORT_TIME), "time of day"),

@@ -61,6 +61,12 @@ NUMBERS: dict[str, tuple[str, list[float]]] = {
     "words in the first rows": (
         lines("t,x,y", "0,1,2", "1,off,off", *(f"{i},{i + 1},7" for i in range(2, 9))), [1, NAN, 3]
     ),
+    "a blank line below the header": (lines("t,x", "(ms),(mV)", "", "0,1", "1,2"), [1, 2]),
+    "numbers for names": (lines("Time,1,x", "0,5,1", "1,5,2", "2,5,3"), [1, 2, 3]),
+    "a remark in some rows": (lines("t,x,remark", "0,1", "1,2,start", "2,3"), [1, 2, 3]),
+    "a trigger line above": (
+        lines("LECROY,Waveform", "#1,12-Dec-2014 16:02:01,0", "t,x", "-0.1,1", "0,2"), [1, 2]
+    ),
     "rule below the header": (lines("|t|x|", "|---|---|", "|0|1|", "|1|2|"), [1, 2]),
 }  # fmt: skip
 
@@ -103,6 +109,9 @@ TIMES: dict[str, tuple[str, list[int]]] = {
     ),
     "names of months": (counted("04-Mar-2024 05:06:0{i},1"), steps(MARCH_4)),
     "German months": (counted("4. März 2024 05:06:0{i},1"), steps(MARCH_4)),
+    "without signs": (counted("20240304T05060{i}Z,1"), steps(MARCH_4)),
+    "for names of files": (counted("2024-03-04_05-06-0{i},1"), steps(MARCH_4)),
+    "as C writes it": (counted("Mon Mar  4 05:06:0{i} 2024,1"), steps(MARCH_4)),
     "noon": (lines("t,x", "11:59:59 AM,1", "12:00:00 PM,2"), steps(43_199 * 10**9, count=2)),
     "minutes and seconds": (counted("59:5{i}.5,1"), steps(3590 * 10**9 + 5 * 10**8)),
     "milliseconds behind a colon": (counted("12:00:0{i}:250,1"), steps(43_200_250_000_000)),
@@ -143,7 +152,7 @@ REFUSED = {
     "commas everywhere": (counted("{i},5,{j},25"), "separate decimals as well"),
     "thousands without quotes": (
         lines("t,x,y", "0,995,2", "1,998,2", *(f"{i},1,{i:03d},2" for i in range(2, 40))),
-        "line 3 has 3 cells, the next one 4",
+        "line 4 has 4 cells, line 2 has 3, the header 3",
     ),
     "a longer row": (counted("{i},{j}", count=300) + "300,1,234\n", "row 301"),
     "two tables": (counted("{i},{j}") + "\nu,v\n" + counted("{i},{j}", "u,v", 9), "split the file"),
@@ -189,6 +198,26 @@ def test_guesses(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) 
     (tmp_path / "t.csv").write_text(text)
     assert run(["import", str(tmp_path / "t.csv"), "--guess"]) == 0
     assert said in capsys.readouterr().out
+
+
+def test_units_stand_in_many_places(tmp_path: Path) -> None:
+    heads = {
+        "t [s];x [mm]": "0;1", "t / s;x / mm": "0;1", "t in s;x in mm": "0;1", "t;x\ns;mm": "0;1",
+        "t;x\n[s];[mm]": "0;1", "t;x;unit": "0 s;1;mm", "t;x": "0 s;1 mm",
+    }  # fmt: skip
+    for head, row in heads.items():
+        units = load(tmp_path / "t.csv", lines(head, row, row, row)).units
+        assert sorted(units.values()) == ["mm", "s"], head
+    assert load(tmp_path / "t.csv", lines("t,x (actual)", "0,1", "1,2")).units == {}
+
+
+@pytest.mark.parametrize(
+    ("data", "said"), [(b"PK\x03\x04", "Excel"), (b"<html>", "markup"), (b'{"a": 1}', "JSON")]
+)
+def test_files_of_other_kinds_are_named(tmp_path: Path, data: bytes, said: str) -> None:
+    (tmp_path / "t.csv").write_bytes(data)
+    with pytest.raises(ImportFailed, match=said):
+        CsvImporter().load(tmp_path / "t.csv")
 
 
 def imported(tmp_path: Path, text: str, mapping: str, capsys: Any) -> tuple[int, dict[str, Any]]:
