@@ -148,7 +148,7 @@ class _Scanner:
     def _go_on(self, at: int, error: Malformed) -> int | None:
         """Behind a record whose frame holds, else at the next proved one.
 
-        A frame holds if a record follows it and no proved one lies inside it.
+        A frame holds if records follow it one behind the other, up to the next proved one.
         """
         data, size = self.source.data, self.source.size
         found = self._salvage.next_proved(at + 1)
@@ -156,7 +156,7 @@ class _Scanner:
             length = _HEAD + int(records.RECORD_HEAD.unpack_from(data, at)[1])
             end = at + length
             is_framed = end == size or _is_head(data, end, size)
-            if is_framed and (found is None or found >= end):
+            if is_framed and (found is None or _leads_to(data, end, found)):
                 self._leave_out("record", at, length, error)
                 return end
         return self._resume(at, found)
@@ -296,6 +296,13 @@ class _Scanner:
         for channel_id, count in counts.items():
             self.index.statistics.add(channel_id, count, entry.start_ns, entry.end_ns)
         self._counts = {}
+
+
+def _leads_to(data: memoryview, at: int, target: int) -> bool:
+    """True if whole records stand one behind the other from `at` up to `target`."""
+    while at < target and _is_head(data, at, target):
+        at += _HEAD + int(records.RECORD_HEAD.unpack_from(data, at)[1])
+    return at == target
 
 
 def _is_head(data: memoryview, at: int, end: int) -> bool:

@@ -114,6 +114,25 @@ def test_nearly_all_is_kept_and_nothing_is_wrong(
         assert recovered >= read
 
 
+def test_a_wrong_length_that_leads_to_what_looks_like_a_record_hides_nothing(
+    original: Original, tmp_path: Path
+) -> None:
+    path = tmp_path / "x.mcap"
+    path.write_bytes(original.data)
+    with seamlog.open_session(path) as session:
+        chunks = [(row.offset, row.length) for row in session.files[0].index.chunks]
+    # One byte less, and the last one is taken for the kind of the next record.
+    misleading = [at for at, size in chunks if 0 < original.data[at + size - 1] <= 15]
+    assert misleading
+    for at in misleading[:8]:
+        data = bytearray(original.data)
+        length = int.from_bytes(data[at + 1 : at + 9], "little") - 1
+        data[at + 1 : at + 9] = length.to_bytes(8, "little")
+        path.write_bytes(data)
+        assert kept_by_readers(path, original) >= 0.97
+        assert kept_by_recovery(path, original) >= 0.97
+
+
 @pytest.mark.parametrize("size", [8, 512, 4096])
 def test_a_file_that_lost_its_first_bytes_is_read(
     original: Original, size: int, tmp_path: Path
