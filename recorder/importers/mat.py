@@ -1,5 +1,7 @@
 """MATLAB files: up to version 7.2 through SciPy, version 7.3 (HDF5) through pymatreader."""
 
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ from seamlog.errors import HardwareError, ImportFailed
 from .content import Content
 
 _HDF5 = (b"MATLAB 7.3", b"\x89HDF\r\n")
+_TRIAL = "import sys, scipy.io; scipy.io.loadmat(sys.argv[1])"
 _MOST_RECORDS = 64
 _MOST_DENSE = 10_000_000
 _SHORTEST_SIGNAL = 8
@@ -59,8 +62,21 @@ class MatImporter:
 def _read(path: Path) -> Mapping[str, Any]:
     import scipy.io
 
+    _try_apart(path)
     found: Mapping[str, Any] = scipy.io.loadmat(str(path), squeeze_me=False, struct_as_record=True)
     return found
+
+
+def _try_apart(path: Path) -> None:
+    """Read in a process of its own first: SciPy's C code dies of some damaged files."""
+    tried = subprocess.run(
+        [sys.executable, "-c", _TRIAL, str(path)], capture_output=True, check=False
+    )
+    if tried.returncode < 0:
+        raise ImportFailed(
+            f"{path} is damaged: SciPy's reader of MATLAB files dies of it (signal "
+            f"{-tried.returncode}); save the data again, or as CSV"
+        )
 
 
 def _read_hdf5(path: Path, notes: list[str]) -> Mapping[str, Any]:

@@ -1,6 +1,7 @@
 """Bags, TDMS, MATLAB 7.3, Parquet and video files, made by the libraries of others."""
 
 import json
+import struct
 import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import scipy.io
 from mcap.reader import make_reader
 from nptdms import ChannelObject, TdmsWriter
 from rosbags.highlevel import AnyReader
@@ -141,6 +143,17 @@ def test_bytes_of_another_kind_are_refused(tmp_path: Path, suffix: str, data: by
         ["import", str(tmp_path / f"x.{suffix}"), "-o", str(tmp_path / "s.mcap"), "--map", "m"]
     )
     assert code == 3
+    assert not (tmp_path / "s.mcap").exists()
+
+
+def test_a_matlab_file_of_which_its_reader_dies_is_an_error(tmp_path: Path, capsys: Any) -> None:
+    path = tmp_path / "x.mat"
+    scipy.io.savemat(path, {"s": {"b": np.arange(5.0)}})
+    data = bytearray(path.read_bytes())
+    data[data.index(struct.pack("<2I", 9, 40))] = 255  # a type of numbers that there is not
+    path.write_bytes(data)
+    assert run(["import", str(path), "-o", str(tmp_path / "s.mcap"), "--map", "m"]) == 3
+    assert "x.mat is damaged" in capsys.readouterr().err
     assert not (tmp_path / "s.mcap").exists()
 
 
