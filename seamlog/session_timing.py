@@ -3,6 +3,7 @@
 Read from the message indexes; only chunks without one are unpacked.
 """
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from seamlog.channels import CHANNELS
 from seamlog.evenness import Evenness, evenness_of
+from seamlog.mcap import records
 from seamlog.mcap.file import McapFile
 from seamlog.mcap.message_index import read_message_index
 from seamlog.mcap.records import ChunkEntry
@@ -19,6 +21,7 @@ from seamlog.mcap.records import ChunkEntry
 if TYPE_CHECKING:
     from seamlog.session import Session
 
+_HEAD = struct.Struct("<BQHIQ")
 RECORDER = CHANNELS["/seamlog/recorder"]
 
 
@@ -81,11 +84,19 @@ def _chunk(file: McapFile, entry: ChunkEntry) -> Iterator[tuple[int, NDArray[np.
 
 
 def _unindexed(file: McapFile, entry: ChunkEntry) -> Iterator[tuple[int, NDArray[np.int64], int]]:
-    for number in entry.index_offsets or file.index.channels:
-        places = file.message_places(entry, number)
-        if places:
-            share = entry.uncompressed_size // max(len(entry.index_offsets), 1)
-            yield number, np.array([time for time, _ in places], np.int64), share
+    """By walking over the unpacked chunk, once for all channels."""
+    times: dict[int, list[int]] = {}
+    sizes: dict[int, int] = {}
+    for chunk in file.iter_chunks([entry]):
+        at, end = 0, len(chunk.data)
+        while at + _HEAD.size <= end:
+            opcode, length, number, _, time = _HEAD.unpack_from(chunk.data, at)
+            if opcode == records.MESSAGE:
+                times.setdefault(number, []).append(time)
+                sizes[number] = sizes.get(number, 0) + length + records.RECORD_HEAD.size
+            at += length + records.RECORD_HEAD.size
+    for number, found in times.items():
+        yield number, np.array(found, np.uint64).view(np.int64), sizes[number]
 
 
 def _timing(times: NDArray[np.int64], size: int) -> Timing:

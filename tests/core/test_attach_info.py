@@ -7,6 +7,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from mcap.writer import IndexType, Writer
 
 import seamlog
 from seamlog import messages
@@ -169,3 +170,23 @@ def test_info_counts_bytes_of_foreign_files(
     for topic in expected:
         assert rows[topic]["size_bytes"] >= 31 * rows[topic]["count"]
         assert rows[topic]["rate_hz"] == pytest.approx(25.0)
+
+
+@pytest.mark.parametrize("index", [IndexType.ALL, IndexType.NONE])
+def test_bytes_of_topics_that_share_chunks_are_exact(
+    tmp_path: Path, index: IndexType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with (tmp_path / "x.mcap").open("wb") as file:
+        writer = Writer(file, chunk_size=5000, index_types=index)
+        writer.start()
+        channels = [writer.register_channel(topic, "json", 0) for topic in ("/a", "/b")]
+        for time in range(500):
+            for channel, payload in zip(channels, (b"{}", b'{"x": 1}'), strict=True):
+                writer.add_message(channel, time, payload, time)
+        writer.finish()  # type: ignore[no-untyped-call]
+    assert run(["info", str(tmp_path / "x.mcap"), "--json"]) == 0
+    rows = {c["topic"]: c for c in json.loads(capsys.readouterr().out)["channels"]}
+    assert [rows[topic]["count"] for topic in ("/a", "/b")] == [500, 500]
+    if index == IndexType.NONE:
+        assert [rows[topic]["size_bytes"] for topic in ("/a", "/b")] == [500 * 33, 500 * 39]
+    assert rows["/a"]["size_bytes"] + rows["/b"]["size_bytes"] <= 500 * 72 + 500
