@@ -25,6 +25,7 @@ BY_SUFFIX = {
     "mat": "mat",
     "parquet": "parquet pq",
     "tdms": "tdms",
+    "ulog": "ulg ulog",
     "ros2": "mcap db3 zstd",
     "ros1": "bag",
     "video": "mp4 mkv avi mov webm mjpeg mjpg mpg m4v",

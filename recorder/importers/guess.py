@@ -73,7 +73,11 @@ def _bare(name: str) -> str:
 
 
 def _without_unit(name: str) -> str:
-    """`Weg` of `Weg / mm` and `Weg [m/min]`; groups have no blanks around their slash."""
+    """`Weg` of `Weg / mm` and `Weg [m/min]`; groups have no blanks around their slash.
+
+    Places of elements stay: `q[0]` is `q_0`.
+    """
+    name = re.sub(r"\[(\d+)\]", r"_\1", name)
     return re.sub(r"(\s+[/,]\s*|,\s*| in )[^\s,]+$|\s*[\[(][^\[\]()]*[\])]\s*$", "", name)
 
 
