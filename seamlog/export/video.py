@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError, FrameMissing, HardwareError
 from seamlog.files import replacing
@@ -12,6 +13,8 @@ from seamlog.session import Session
 
 _TICK = Fraction(1, 90_000)
 """Time base of MPEG; a stamp moves by at most 6 us."""
+_TV, _BT601 = 1, 5
+"""Codes of H.264 for the range and the matrix of colours."""
 
 
 def write_video(session: Session, topic: str, path: Path, force: bool) -> int:
@@ -32,9 +35,13 @@ def write_video(session: Session, topic: str, path: Path, force: bool) -> int:
         with av.open(str(partial), "w", format=kind) as container:
             first = int(frames.stamps_ns.min())
             container.metadata["creation_time"] = f"{np.datetime64(first, 'ns')}Z"
-            copy = kind == "matroska" and all(f.format == "jpeg" for f in frames[:1])
+            copy = kind == "matroska" and all(_is_jpeg(frame) for frame in frames[:1])
             write = _copy_all if copy else _encode_all
             return write(container, frames, first, av)
+
+
+def _is_jpeg(frame: Any) -> bool:
+    return bool(frame.data[:2] == b"\xff\xd8")
 
 
 def _ticks(stamp_ns: int, first_ns: int) -> int:
@@ -45,6 +52,11 @@ def _copy_all(container: Any, frames: Any, first_ns: int, av: Any) -> int:
     stream = _stream(container, "mjpeg", frames[0].image().shape, "yuvj420p")
     count = 0
     for frame in _in_order(frames):
+        if not _is_jpeg(frame):
+            raise EvidenceError(
+                f"{frame.where}: a picture of another kind among JPEGs; export .mp4, which encodes "
+                "them anew"
+            )
         packet = av.Packet(frame.data)
         packet.stream = stream
         packet.pts = packet.dts = _ticks(frame.stamp_ns, first_ns)
@@ -57,13 +69,18 @@ def _copy_all(container: Any, frames: Any, first_ns: int, av: Any) -> int:
 
 def _encode_all(container: Any, frames: Any, first_ns: int, av: Any) -> int:
     stream, count, last = None, 0, -1
+    shape: tuple[int, ...] = ()
     for frame in _in_order(frames):
         image = frame.image()
-        image = np.repeat(image[..., None], 3, axis=2) if image.ndim == 2 else image
-        image = np.ascontiguousarray(image[: image.shape[0] & ~1, : image.shape[1] & ~1])
         if stream is None:
-            stream = _stream(container, "libx264", image.shape, "yuv420p")
-        picture = av.VideoFrame.from_ndarray(image, format="bgr24")
+            shape = image.shape[:2]
+            stream = _stream(container, "libx264", shape, "yuv420p")
+        if image.shape[:2] != shape:
+            raise EvidenceError(
+                f"{frame.where}: a picture of {image.shape[1]} x {image.shape[0]} pixels after "
+                f"{shape[1]} x {shape[0]}; export .mkv, which keeps them, or each range alone"
+            )
+        picture = av.VideoFrame.from_ndarray(_planes(image), format="yuv420p")
         last = picture.pts = max(_ticks(frame.stamp_ns, first_ns), last + 1)
         picture.time_base = _TICK
         container.mux(stream.encode(picture))
@@ -71,6 +88,19 @@ def _encode_all(container: Any, frames: Any, first_ns: int, av: Any) -> int:
     if stream is not None:
         container.mux(stream.encode(None))
     return count
+
+
+def _planes(image: NDArray[Any]) -> NDArray[Any]:
+    """Pixels as H.264 has them (BT.601, limited range), an odd last row or column doubled.
+
+    By OpenCV, which rounds; swscale cuts, and pictures come out up to 3 grey levels darker.
+    """
+    import cv2
+
+    colours = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image
+    down, right = image.shape[0] & 1, image.shape[1] & 1
+    even = cv2.copyMakeBorder(colours, 0, down, 0, right, cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.cvtColor(even, cv2.COLOR_BGR2YUV_I420))
 
 
 def _in_order(frames: Any) -> Any:
@@ -83,9 +113,10 @@ def _in_order(frames: Any) -> Any:
 
 def _stream(container: Any, codec: str, shape: tuple[int, ...], pixels: str) -> Any:
     stream = container.add_stream(codec, rate=1000)
-    stream.height, stream.width = shape[0] & ~1, shape[1] & ~1
-    if codec == "mjpeg":
-        stream.height, stream.width = shape[:2]
+    stream.height, stream.width = shape[:2]
+    if codec == "libx264":
+        stream.height, stream.width = shape[0] + (shape[0] & 1), shape[1] + (shape[1] & 1)
+        stream.codec_context.color_range, stream.codec_context.colorspace = _TV, _BT601
     stream.pix_fmt, stream.time_base = pixels, _TICK
     stream.codec_context.time_base = _TICK
     return stream
