@@ -32,6 +32,8 @@ _CARRIES = 0.3
 """Part of the change over a toe that its step must carry, whatever lies beside it."""
 _LIKELY = 0.2
 """Evidence, of the best model's, that a model must have to be chosen."""
+_ALIKE_PX = 0.05
+"""Difference in place up to which the simpler model is taken."""
 _BLOCKS = 16
 _TRUST = 0.25
 """Part of what a richer model moves an edge by that stays in doubt."""
@@ -94,7 +96,9 @@ def _chosen(profiles: Floats, centre: NDArray[np.int64], window: Window) -> Edge
     places = np.array([candidate.place for candidate in tried])
     likely = np.exp((scores.min() - scores) / _price(window))
     risks = (places[:, None] - places) ** 2 @ likely / likely.sum()
-    best = int(np.argmin(np.where(likely < _LIKELY, np.inf, risks)))
+    risks[likely < _LIKELY] = np.inf
+    good = np.flatnonzero(risks <= risks.min() + _ALIKE_PX**2)
+    best = min(good, key=lambda one: (parameters(tried[one].name), risks[one]))
     moved_by = places[best] - places[0]
     u = float(np.hypot(np.sqrt(risks[best]), _TRUST * moved_by))
     name, blur = tried[best].name, tried[best].blur
@@ -144,7 +148,8 @@ def _shading(means: Floats, window: Window, model: str, blur: float) -> Floats:
     parts = basis(window.columns - place, model, blur)
     weighted = parts * window.weight[:, None]
     found = np.linalg.lstsq(weighted, (means * window.weight).T, rcond=None)[0]
-    return np.asarray((parts[:, 2:] @ found[2:]).T)
+    shading = (parts[:, 2:] @ found[2:]).T
+    return np.asarray(gaussian_filter1d(shading, 1.0, axis=0, mode="nearest"))
 
 
 def aligned_means(profiles: Floats, shift: Floats) -> Floats:
