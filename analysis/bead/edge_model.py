@@ -15,6 +15,7 @@ from .edge_shapes import (
     Floats,
     Window,
     basis,
+    energy,
     fit,
     parameters,
     peak,
@@ -127,8 +128,7 @@ def _step(means: Floats, window: Window, candidate: _Candidate) -> float:
 
 def _price(window: Window) -> float:
     """How much lower (log) the misfit must be for each further parameter (Schwarz 1978)."""
-    columns = float((window.weight**2).sum())
-    return float(np.log(columns)) / columns
+    return float(np.log(window.size)) / window.size
 
 
 def alignment(profiles: Floats, centre: NDArray[np.int64], window: Window) -> Floats:
@@ -173,10 +173,10 @@ def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
     """A model at the blur, between those that are tried, where its misfit is least."""
     shifts, bases = shifts_within(1.5), subspaces(window, model, _BLURS_PX, 1.5)
     weighted = (means - means.mean(axis=1, keepdims=True)) * window.weight
-    shape = (len(means), len(_BLURS_PX), len(shifts), -1)
-    captured = ((weighted @ bases) ** 2).reshape(shape).sum(axis=3)
+    captured = energy((weighted @ bases).reshape(len(means), parameters(model), -1))
+    captured = captured.reshape(len(means), len(_BLURS_PX), len(shifts))
     best = captured.max(axis=2)
-    freedom = max(float((window.weight**2).sum()) - parameters(model) - 1, 1.0)
+    freedom = max(window.size - parameters(model) - 1, 1.0)
     misfit = np.median((weighted**2).sum(axis=1)[:, None] - best, axis=0) / freedom
     floor = GREY_FLOOR + (EDGE_FLOOR * float(np.median(np.ptp(means, axis=1)))) ** 2
     logs = np.log(np.maximum(misfit, 0) + floor)
@@ -190,13 +190,12 @@ def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
     return _Candidate(model, blur, score, float(np.median(places)))
 
 
-def typical_blur(profiles: Floats, window: Window) -> float:
-    """Blur that fits single rows best: where a toe is ragged, their mean is softer than they."""
-    scores = []
-    for model in ("step", "line", "ramps", "ramps, line"):
-        for blur in _BLURS_PX[::2]:
-            misfit = float(np.median(fit(profiles, window, model, blur, 2.5).misfit))
-            freedom = float((window.weight**2).sum()) - parameters(model) - 1
-            score = float(np.log(misfit / max(freedom, 1) + GREY_FLOOR))
-            scores.append((score + _price(window) * (parameters(model) - 2), blur))
-    return min(scores)[1]
+def typical_blur(profiles: Floats, window: Window, model: str) -> float:
+    """Blur at which a model fits single rows best: a ragged toe's mean is softer than they."""
+    blurs, shifts = _BLURS_PX[::2], shifts_within(2.5)
+    weighted = (profiles - profiles.mean(axis=1, keepdims=True)) * window.weight
+    bases = subspaces(window, model, blurs, 2.5)
+    captured = energy((weighted @ bases).reshape(len(profiles), parameters(model), -1))
+    most = captured.reshape(len(profiles), len(blurs), len(shifts)).max(axis=2)
+    misfit = (weighted**2).sum(axis=1, keepdims=True) - most
+    return blurs[int(np.argmin(np.median(misfit, axis=0)))]

@@ -106,7 +106,9 @@ def _whitening(plain: Floats, model: EdgeModel) -> Floats:
     size = float(np.median(np.ptp(plain, axis=1)))
     covariance = np.eye(len(at)) * (GREY_FLOOR + (EDGE_FLOOR * size) ** 2)
     step, clear = step_at(at, blur), 2.0 * blur + 1.5
-    for part, share in ((at < -clear, 1 - step), (at > clear, step)):
+    window = model.window
+    plate, bead = at < -min(clear, window.outside - 2), at > min(clear, window.inside - 2)
+    for part, share in ((plate, 1 - step), (bead, step)):
         own = _autocovariance(texture[:, part], len(at))
         covariance += own[lags] * np.sqrt(np.outer(share, share))
     weight = model.window.weight
@@ -116,11 +118,11 @@ def _whitening(plain: Floats, model: EdgeModel) -> Floats:
 def _autocovariance(texture: Floats, lags: int) -> Floats:
     """Autocovariance across columns, biased so that it is positive definite, (lags,)."""
     count = texture.shape[1]
-    found = np.zeros(lags)
-    for lag in range(min(count, lags)):
-        products = texture[:, lag:] * texture[:, : count - lag]
-        found[lag] = products.mean(axis=0).sum() / count
-    return found
+    apart = np.subtract.outer(np.arange(count), np.arange(count))
+    products = texture.T @ texture / len(texture)
+    found = np.bincount(np.abs(apart).ravel(), products.ravel(), minlength=lags)[:lags] / count
+    found[1:] /= 2
+    return np.asarray(found, dtype=np.float64)
 
 
 def _astray(plain: Floats, shift: Floats, model: EdgeModel) -> float:
@@ -137,7 +139,7 @@ def _random_u(found: Fit, window: Window) -> Floats:
 
     Means of logarithms, so that a drop of spatter in a few rows does not count for all.
     """
-    freedom = max(float((window.weight**2).sum()) - 3, 1)
+    freedom = max(window.size - 3, 1)
     noise = np.exp(_slow(np.log(found.misfit), 15.0) + 1 / freedom) / freedom
     return np.asarray(np.sqrt(np.exp(_slow(np.log(found.variance), 3.0)) * noise))
 

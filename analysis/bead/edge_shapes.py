@@ -54,10 +54,20 @@ class Window:
     @property
     def weight(self) -> Floats:
         """1 near the edge, falling to a tenth at the borders."""
-        at = self.columns
-        share = np.where(at < 0, -at / (self.outside + 1), at / (self.inside + 1))
-        fall = np.clip((share - 0.6) / 0.4, 0, 1)
-        return np.asarray(0.55 + 0.45 * np.cos(np.pi * fall))
+        return _weight(self)
+
+    @property
+    def size(self) -> float:
+        """Columns, each counted by the square of its weight."""
+        return float(self.weight @ self.weight)
+
+
+@cache
+def _weight(window: Window) -> Floats:
+    at = window.columns
+    share = np.where(at < 0, -at / (window.outside + 1), at / (window.inside + 1))
+    fall = np.clip((share - 0.6) / 0.4, 0, 1)
+    return np.asarray(0.55 + 0.45 * np.cos(np.pi * fall))
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +128,7 @@ def shifts_within(reach: float) -> Floats:
 def subspaces(window: Window, model: str, blurs: tuple[float, ...], reach: float) -> Floats:
     """Orthonormal bases of the weighted profiles side by side.
 
-    Shape (window, blurs x shifts x k), the last index fastest.
+    Shape (window, k x blurs x shifts), the last index fastest.
     """
     at = window.columns - shifts_within(reach)[:, None]
     stacked = np.concatenate([basis(at, model, blur) for blur in blurs])
@@ -126,10 +136,10 @@ def subspaces(window: Window, model: str, blurs: tuple[float, ...], reach: float
 
 
 def side_by_side(stacked: Floats) -> Floats:
-    """Orthonormal bases of a stack (n, window, k), as (window, n x k), each in its own sense."""
+    """Orthonormal bases of a stack (n, window, k), as (window, k x n), each in its own sense."""
     bases, sizes = np.linalg.qr(stacked)
     bases = bases * np.sign(np.diagonal(sizes, axis1=1, axis2=2))[:, None, :]
-    return np.ascontiguousarray(bases.transpose(1, 0, 2).reshape(stacked.shape[1], -1))
+    return np.ascontiguousarray(bases.transpose(1, 2, 0).reshape(stacked.shape[1], -1))
 
 
 def fit(profiles: Floats, window: Window, model: str, blur: float, reach: float) -> Fit:
@@ -139,15 +149,21 @@ def fit(profiles: Floats, window: Window, model: str, blur: float, reach: float)
 
 
 def best_shifts(weighted: Floats, bases: Floats, shifts: Floats) -> Fit:
-    """The shift at which the bases (window, shifts x k) capture most of each weighted profile.
+    """The shift at which the bases (window, k x shifts) capture most of each weighted profile.
 
     A step that falls towards the bead captures nothing.
     """
-    projected = (weighted @ bases).reshape(len(weighted), len(shifts), -1)
-    captured = np.where(projected[..., 1] > 0, (projected**2).sum(axis=2), 0.0)
+    projected = (weighted @ bases).reshape(len(weighted), -1, len(shifts))
+    captured = energy(projected)
+    captured[projected[:, 1] <= 0] = 0.0
     places, most, curvature = peak(captured, shifts)
-    misfit = np.maximum((weighted**2).sum(axis=1) - most, 1e-9)
+    misfit = np.maximum(np.einsum("rn,rn->r", weighted, weighted) - most, 1e-9)
     return Fit(places, misfit, _STEP**2 / (-0.5 * curvature))
+
+
+def energy(projected: Floats) -> Floats:
+    """Sum of squares over the middle axis."""
+    return np.einsum("rkn,rkn->rn", projected, projected)
 
 
 def peak(captured: Floats, shifts: Floats) -> tuple[Floats, Floats, Floats]:

@@ -127,7 +127,8 @@ class _Side:
             return model.blur
         every = max(1, len(near) // _TRIED_ROWS)
         centre = np.rint(near[::every]).astype(np.int64)
-        return typical_blur(profiles_at(signal[::every], centre, self._window), self._window)
+        profiles = profiles_at(signal[::every], centre, self._window)
+        return typical_blur(profiles, self._window, model.name)
 
     def _smeared(self, places: EdgePlaces, share: float, every: int) -> float:
         """Px of the toe's own waviness that blur and averaging take away, rms.

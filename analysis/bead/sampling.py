@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .curve import Centreline
-from .image import Photo
+from .image import Photo, opponent
 from .plane import Plane
 
 Floats = NDArray[np.float32]
@@ -62,7 +62,7 @@ def sample_offsets(
     valid = (x >= 0) & (x <= photo.width_px - 1) & (y >= 0) & (y <= photo.height_px - 1)
     left, right = _span(x, photo.width_px)
     top, bottom = _span(y, photo.height_px)
-    part = photo.opponent(slice(top, bottom), slice(left, right))
+    part = photo.pixels[top:bottom, left:right]
     factor = min(max(1, int(blur)), *part.shape[:2])
     if factor > 1:
         part = _averaged(part, factor)
@@ -75,7 +75,7 @@ def sample_offsets(
         cv2.INTER_CUBIC,
         borderMode=cv2.BORDER_REPLICATE,
     )
-    return np.asarray(sampled, dtype=np.float32).reshape(*x.shape, -1), valid
+    return opponent(sampled), valid
 
 
 def _averaged(pixels: NDArray[Any], factor: int) -> NDArray[Any]:
