@@ -52,7 +52,7 @@ def fit_centreline(path: Points, step: float, knot_spacing: float) -> Centreline
     keep = np.concatenate([[True], np.diff(length) > 1e-9])
     path, length = path[keep], length[keep]
     curve = _spline(path, length, knot_spacing)
-    dense = np.linspace(0.0, length[-1], max(16, int(4 * length[-1] / step)))
+    dense = np.linspace(0.0, length[-1], max(64, int(length[-1] / step)))
     walked = arc_length(curve(dense))
     s = np.arange(0.0, walked[-1] + 1e-9, step)
     at = np.interp(s, walked, dense)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from .edge_shapes import (
+    COARSE,
     MODELS,
     Floats,
     Window,
@@ -171,7 +172,8 @@ def moved(profiles: Floats, rows: NDArray[np.int64], shift: Floats) -> Floats:
 
 def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
     """A model at the blur, between those that are tried, where its misfit is least."""
-    shifts, bases = shifts_within(1.5), subspaces(window, model, _BLURS_PX, 1.5)
+    shifts = shifts_within(1.5, COARSE)
+    bases = subspaces(window, model, _BLURS_PX, 1.5, COARSE)
     weighted = (means - means.mean(axis=1, keepdims=True)) * window.weight
     captured = energy((weighted @ bases).reshape(len(means), parameters(model), -1))
     captured = captured.reshape(len(means), len(_BLURS_PX), len(shifts))
@@ -192,9 +194,9 @@ def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
 
 def typical_blur(profiles: Floats, window: Window, model: str) -> float:
     """Blur at which a model fits single rows best: a ragged toe's mean is softer than they."""
-    blurs, shifts = _BLURS_PX[::2], shifts_within(2.5)
+    blurs, shifts = _BLURS_PX[::2], shifts_within(2.5, COARSE)
     weighted = (profiles - profiles.mean(axis=1, keepdims=True)) * window.weight
-    bases = subspaces(window, model, blurs, 2.5)
+    bases = subspaces(window, model, blurs, 2.5, COARSE)
     captured = energy((weighted @ bases).reshape(len(profiles), parameters(model), -1))
     most = captured.reshape(len(profiles), len(blurs), len(shifts)).max(axis=2)
     misfit = (weighted**2).sum(axis=1, keepdims=True) - most

@@ -7,6 +7,7 @@ least squares, Aitken 1936).
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
@@ -33,7 +34,7 @@ from .edge_shapes import (
 )
 
 _REACH = 2.5
-_SLOW = 20.0
+_SLOW = 61
 """Rows over which what varies more slowly than texture is averaged."""
 
 
@@ -58,12 +59,12 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     """Refine edges of `signal` (rows, columns; bead to the right) within two columns of `near`."""
     centre = np.rint(near).astype(np.int64)
     seen = profiles_at(signal, centre, model.window)
-    plain = _plain(seen, centre, model)
-    found = _placed(plain, model)
+    plain = seen - shading_along(seen, centre, model)
+    found = place_steps(plain, model)
     shift = found.shift - _astray(plain, found.shift, model)
     return EdgePlaces(
         column=centre + shift,
-        u_noise=_random_u(found, model.window),
+        u_noise=random_u(found, model.window),
         u_model=np.full(len(near), model.u),
         height=_height(seen, shift, model.window, model.blur),
         bare=_height(plain, shift, model.window, model.blur),
@@ -72,10 +73,10 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     )
 
 
-def _plain(profiles: Floats, centre: NDArray[np.int64], model: EdgeModel) -> Floats:
-    """Profiles without the model's shading, which is that of the blocks before and behind."""
+def shading_along(profiles: Floats, centre: NDArray[np.int64], model: EdgeModel) -> Floats:
+    """The model's shading in each profile: that of the blocks before and behind."""
     if model.name == "step":
-        return profiles
+        return np.zeros_like(profiles)
     blocks = len(model.shading)
     at = np.clip(np.linspace(0, blocks, len(profiles)) - 0.5, 0, blocks - 1)
     low = np.minimum(at.astype(np.int64), max(blocks - 2, 0))
@@ -83,11 +84,11 @@ def _plain(profiles: Floats, centre: NDArray[np.int64], model: EdgeModel) -> Flo
     shift = -alignment(profiles, centre, model.window)
     before = moved(model.shading, low, shift)
     behind = moved(model.shading, np.minimum(low + 1, blocks - 1), shift)
-    return np.asarray(profiles - (1 - part) * before - part * behind)
+    return np.asarray((1 - part) * before + part * behind)
 
 
-def _placed(plain: Floats, model: EdgeModel) -> Fit:
-    """The step's shift in each row, by the noise of its columns."""
+def place_steps(plain: Floats, model: EdgeModel) -> Fit:
+    """The step's shift in each row without shading, by the noise of its columns."""
     white = _whitening(plain, model)
     shifts = shifts_within(_REACH)
     at = model.window.columns - shifts[:, None]
@@ -101,7 +102,7 @@ def _whitening(plain: Floats, model: EdgeModel) -> Floats:
     Plate and bead have each their own stationary texture, seen where the edge is not.
     """
     at, blur = model.window.columns, model.blur
-    texture = plain - gaussian_filter1d(plain, _SLOW, axis=0, mode="nearest")
+    texture = plain - cv2.blur(plain, (1, _SLOW), borderType=cv2.BORDER_REPLICATE)
     lags = np.abs(np.subtract.outer(np.arange(len(at)), np.arange(len(at))))
     size = float(np.median(np.ptp(plain, axis=1)))
     covariance = np.eye(len(at)) * (GREY_FLOOR + (EDGE_FLOOR * size) ** 2)
@@ -134,7 +135,7 @@ def _astray(plain: Floats, shift: Floats, model: EdgeModel) -> float:
     return -float(np.median(fit(means, model.window, "step", model.blur, 1.5).shift))
 
 
-def _random_u(found: Fit, window: Window) -> Floats:
+def random_u(found: Fit, window: Window) -> Floats:
     """Standard uncertainty of each shift; the misfit of some 30 rows tells the noise's size.
 
     Means of logarithms, so that a drop of spatter in a few rows does not count for all.

@@ -30,6 +30,8 @@ _RESOLVED = 2.0
 """Blur, in distances of a line, up to which it can be told from a shift."""
 _PARAMETERS = {"line": 1, "broad line": 1, "ramps": 2, "curves": 2}
 _STEP = 0.125
+COARSE = 0.25
+"""Columns from one shift to the next in fits, and where only models are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,18 +121,20 @@ def _line(z: Floats, away: float, blur: float) -> Floats:
     return np.exp(-0.5 * (z + away) ** 2 / variance) * (1 - step_at(middle, float(spread)))
 
 
-def shifts_within(reach: float) -> Floats:
+def shifts_within(reach: float, step: float = _STEP) -> Floats:
     """The shifts that are tried, in columns."""
-    return np.arange(-reach, reach + 1e-9, _STEP)
+    return np.arange(-reach, reach + 1e-9, step)
 
 
 @cache
-def subspaces(window: Window, model: str, blurs: tuple[float, ...], reach: float) -> Floats:
+def subspaces(
+    window: Window, model: str, blurs: tuple[float, ...], reach: float, step: float = _STEP
+) -> Floats:
     """Orthonormal bases of the weighted profiles side by side.
 
     Shape (window, k x blurs x shifts), the last index fastest.
     """
-    at = window.columns - shifts_within(reach)[:, None]
+    at = window.columns - shifts_within(reach, step)[:, None]
     stacked = np.concatenate([basis(at, model, blur) for blur in blurs])
     return side_by_side(stacked * window.weight[None, :, None])
 
@@ -171,4 +175,5 @@ def peak(captured: Floats, shifts: Floats) -> tuple[Floats, Floats, Floats]:
     at = np.clip(np.argmax(captured, axis=1), 1, len(shifts) - 2)
     a, b, c = (captured[np.arange(len(at)), at + k] for k in (-1, 0, 1))
     curvature = np.minimum(a - 2 * b + c, -1e-9)
-    return shifts[at] + np.clip(0.5 * (a - c) / curvature, -1, 1) * _STEP, b, curvature
+    step = shifts[1] - shifts[0]
+    return shifts[at] + np.clip(0.5 * (a - c) / curvature, -1, 1) * step, b, curvature

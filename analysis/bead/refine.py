@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
@@ -12,7 +13,7 @@ from seamlog.errors import EvidenceError
 from .chain import best_chain
 from .curve import Centreline
 from .edge_model import EdgeModel, choose_model, profiles_at, typical_blur
-from .edge_places import EdgePlaces, locate_edges
+from .edge_places import EdgePlaces, locate_edges, place_steps, random_u, shading_along
 from .edge_shapes import Window
 from .image import Photo
 from .plane import Plane
@@ -27,7 +28,7 @@ Rows = NDArray[np.int64]
 _ALONG_PX = 4.0
 _ALONG_WIDTHS = 0.03
 """Gaussian averaging along the seam: this many px at most, or this part of the width if more."""
-_SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18)
+_SHARES = (1.0, 0.65, 0.42, 0.27, 0.18)
 """Parts of the longest averaging that are tried."""
 _CALM = 1.5
 """Windows follow the coarse toe averaged over this many longest averagings: what they average
@@ -92,10 +93,10 @@ class _Side:
         pixels, self._valid = sample_offsets(photo, plane, line, offsets)
         depth = int(max(4, min(0.25 * half_px, self._reach)))
         direction, self._distance = self._direction(pixels, depth)
-        self._signal: Signal = pixels @ direction.astype(np.float32)
+        self._signal = _mixed(pixels, direction)
 
     def _direction(self, pixels: Signal, depth: int) -> tuple[Floats, float]:
-        rows = np.linspace(0, len(pixels) - 1, min(len(pixels), 2 * _TRIED_ROWS)).astype(np.int64)
+        rows = np.linspace(0, len(pixels) - 1, min(len(pixels), _TRIED_ROWS)).astype(np.int64)
         smooth, valid = averaged_at(pixels, rows, self._longest), self._valid[rows]
         groups = []
         for first in (self._reach + 1, self._reach - depth + 1):
@@ -158,12 +159,16 @@ class _Side:
     def _averaging(self, pick: Rows, near: Floats, model: EdgeModel) -> float:
         """Part of the longest averaging with the least expected error (Stein's estimate)."""
         every = max(1, len(near) // _TRIED_ROWS)
-        places, noise = [], 0.0
+        pick, centre = pick[::every], np.rint(near[::every]).astype(np.int64)
+        shading, places, noise = None, [], 0.0
         for share in _SHARES:
-            signal = averaged_at(self._signal, pick[::every], share * self._longest)
-            found = locate_edges(signal, near[::every], model)
-            places.append(found.column)
-            noise = float(np.median(found.u_noise)) ** 2
+            signal = averaged_at(self._signal, pick, share * self._longest)
+            seen = profiles_at(signal, centre, model.window)
+            if shading is None:
+                shading = shading_along(seen, centre, model)
+            found = place_steps(seen - shading, model)
+            places.append(centre + found.shift)
+            noise = float(np.median(random_u(found, model.window))) ** 2
         return _least_risk(np.array(places), np.array(_SHARES), noise)
 
     def _toes(
@@ -191,16 +196,22 @@ class _Side:
         )
 
 
+def _mixed(pixels: Signal, direction: Floats) -> Signal:
+    """One signal from the channels."""
+    if pixels.shape[2] == 1:
+        return np.asarray(pixels[..., 0] * np.float32(direction[0]))
+    return np.asarray(pixels @ direction.astype(np.float32))
+
+
 def averaged_at(values: Signal, rows: Rows, sigma: float) -> Signal:
     """Gaussian averages over rows, at some rows only."""
     half = int(3 * sigma + 0.5)
     taps = np.arange(-half, half + 1)
-    kernel = np.exp(-0.5 * (taps / sigma) ** 2)
-    kernel = (kernel / kernel.sum()).astype(np.float32)
-    total = np.zeros((len(rows), *values.shape[1:]), dtype=np.float32)
-    for tap, part in zip(taps, kernel, strict=True):
-        total += part * values[np.clip(rows + tap, 0, len(values) - 1)]
-    return total
+    kernel = np.exp(-0.5 * (taps / sigma) ** 2).astype(np.float32)
+    kernel /= kernel.sum()
+    edges = [(half, half)] + [(0, 0)] * (values.ndim - 1)
+    around = sliding_window_view(np.pad(values, edges, mode="edge"), len(taps), axis=0)[rows]
+    return np.asarray(around @ kernel)
 
 
 def columns_of_change(profiles: Signal) -> float:

@@ -19,7 +19,7 @@ from .path import find_paths
 from .plane import Plane, Points
 from .refine import Rough, refine_toes
 from .sampling import Strip, sample_strip
-from .toes import Extent, find_toes
+from .toes import Extent, find_toes, strip_look
 from .width import BandEvidence, Toes, assemble
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,7 @@ _ENOUGH = 40
 """Stations from which on a band inside is looked for."""
 _BEYOND = {"metal": 0.06, "outer": 0.25}
 """Half widths beside a toe, by its definition, that are neither bead nor plate at first."""
-_SECTIONS = 48
+_SECTIONS = 32
 """Sections in which the band along a given path is looked for."""
 
 
@@ -85,7 +85,7 @@ def measure_strip(
     """
     beyond = _BEYOND[toe]
     if prior is not None:
-        sparse = _Tracing(24, 4, (0.45,), beyond)
+        sparse = _Tracing(24, 6, (0.45,), beyond)
         measured = _measure(photo, plane, _given_path(photo, plane, prior), start, sparse)
     else:
         dense = _Tracing(40, 1, (0.45, 0.35, 0.25), beyond)
@@ -217,7 +217,7 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     unit = plane.unit_per_px(plane.to_px(prior))
     length = float(arc_length(prior)[-1])
     reach = min(0.25 * max(photo.width_px, photo.height_px) * unit, 0.5 * length)
-    step = max(unit, reach / 80)
+    step = max(unit, reach / 56)
     line = fit_centreline(prior, step, 6 * step)
     strip = sample_strip(photo, plane, line, reach, step, blur=step / unit)
     features = stack_texture(strip.opponent, 1.5)
@@ -273,13 +273,12 @@ def _straighten(
     step = max(unit, half / tracing.columns)
     strip = _sampled(photo, plane, path, half, unit, step * tracing.stretch, step)
     features = strip_features(strip.opponent, max(1.5, 0.03 * half / step))
+    look = strip_look(features, strip.valid, 2.0 / tracing.stretch)
     middle = strip.column(np.zeros(len(strip.line.s)))
     rough = Extent(middle - half / step, middle + half / step, np.zeros(len(strip.line.s)))
-    along = 2.0 / tracing.stretch
     try:
-        first = find_toes(features, strip.valid, rough, freedom, along, tracing.beyond)
-        again = _calmed(first, strip)
-        return strip, find_toes(features, strip.valid, again, 0.6 * freedom, along, tracing.beyond)
+        first = find_toes(look, rough, freedom, tracing.beyond)
+        return strip, find_toes(look, _calmed(first, strip), 0.6 * freedom, tracing.beyond)
     except EvidenceError as error:
         raise EvidenceError(f"{photo.name}: {error}") from error
 

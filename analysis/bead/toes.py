@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from seamlog.errors import EvidenceError
 
 from .band import edge_evidence
-from .chain import best_chain
+from .chain import best_chains
 from .features import Features, robust_scale, smoothed
 from .zones import likeness, zone
 
@@ -47,34 +47,40 @@ class Extent:
         return (self.right - self.left) / 2
 
 
-def find_toes(
-    features: Features,
-    valid: NDArray[np.bool_],
-    rough: Extent,
-    freedom: float,
-    along: float,
-    beyond: float,
-) -> Extent:
+@dataclass(frozen=True, slots=True)
+class StripLook:
+    """A strip's features averaged along it, (rows, columns, k), what is in the photo, its edges."""
+
+    features: Features
+    valid: NDArray[np.bool_]
+    edges: NDArray[np.float32]
+
+
+def strip_look(features: Features, valid: NDArray[np.bool_], along: float) -> StripLook:
+    """The look of a strip, averaged over `along` rows (Gaussian sigma)."""
+    smooth = smoothed(features, 0.8, along)
+    return StripLook(smooth, valid, _edges(smooth))
+
+
+def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> Extent:
     """Toes near a rough extent: within `freedom` (fraction of the half width) of it.
 
-    Features are averaged over `along` rows (Gaussian sigma). Between a toe and `beyond` half
-    widths outside of it nothing counts as plate beforehand.
+    Between a toe and `beyond` half widths outside of it nothing counts as plate beforehand.
     """
-    smooth = smoothed(features, 0.8, along)
-    columns = features.shape[1]
+    valid, columns = look.valid, look.features.shape[1]
     half = float(np.median(rough.half))
-    edges = _edges(smooth)
     bead = zone(
         columns, rough.middle - _CORE * rough.half, rough.middle + _CORE * rough.half, valid
     )
     core = zone(columns, rough.middle - 0.7 * half, rough.middle + 0.7 * half, valid)
-    toes, present = [], np.full(len(rough.left), np.inf)
+    scores, present = [], np.full(len(rough.left), np.inf)
     for side, edge in ((-1, rough.left), (1, rough.right)):
-        like = likeness(smooth, bead, _plate(columns, edge, side, half, beyond, valid))
-        toes.append(_toe(like, edges, edge, side, half, freedom, valid))
+        like = likeness(look.features, bead, _plate(columns, edge, side, half, beyond, valid))
+        scores.append(_score(like, look, edge, side, half, freedom))
         inside = np.where(core, like, 0).sum(axis=1) / np.maximum(core.sum(axis=1), 1)
         present = np.minimum(present, inside)
-    return Extent(toes[0], toes[1], present)
+    left, right = best_chains(np.stack(scores), _MOVE).astype(np.float64)
+    return Extent(left, right, present)
 
 
 def _plate(
@@ -100,21 +106,20 @@ def _edges(features: Features) -> NDArray[np.float32]:
     return np.asarray(0.5 * (at_edges[:, :-1] + at_edges[:, 1:]), dtype=np.float32)
 
 
-def _toe(
+def _score(
     like: NDArray[np.float32],
-    edges: NDArray[np.float32],
+    look: StripLook,
     rough: Floats,
     side: int,
     half: float,
     freedom: float,
-    valid: NDArray[np.bool_],
-) -> Floats:
-    """Chain that splits bead-like from plate-like places and lies on sharp edges."""
+) -> NDArray[np.float32]:
+    """How well a toe at each column splits bead-like from plate-like places and is sharp."""
     columns = like.shape[1]
-    gathered = np.cumsum(np.where(valid, like, 0), axis=1)
+    gathered = np.cumsum(np.where(look.valid, like, 0), axis=1)
     region = side * gathered / max(4.0, 0.12 * half)
     beyond = side * (np.arange(columns) - rough[:, None])
     reach = freedom * half + 2
-    score = (region + _EDGE * edges).astype(np.float32)
+    score = (region + _EDGE * look.edges).astype(np.float32)
     score = np.where(np.abs(beyond) <= reach, score, np.float32(-1e6))
-    return best_chain(score - score.max(axis=1, keepdims=True), _MOVE).astype(np.float64)
+    return np.asarray(score - score.max(axis=1, keepdims=True))
