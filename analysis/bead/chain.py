@@ -9,7 +9,7 @@ def best_chain(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int64
 
     -inf in `score` marks forbidden places.
     """
-    return best_chains(score[None], move_cost)[0]
+    return np.asarray(best_chains(score[None], move_cost)[0])
 
 
 def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int64]:
@@ -29,15 +29,15 @@ def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int6
 
 
 def _walked_back(values: NDArray[np.float32], cost: np.float32) -> NDArray[np.int64]:
-    """The chains that end best; `values` (rows, n, columns + 2) gather the best up to each place."""
-    rows, count = values.shape[:2]
-    every = np.arange(count)
-    column = np.argmax(values[-1], axis=1)
-    path = np.empty((count, rows), dtype=np.int64)
-    path[:, -1] = column - 1
-    for row in range(rows - 2, -1, -1):
-        around = values[row][every[:, None], column[:, None] + (0, -1, 1)]
-        around[:, 1:] -= cost
-        column = column + np.array((0, -1, 1))[np.argmax(around, axis=1)]
-        path[:, row] = column - 1
+    """The chains that end best; `values` (rows, n, columns + 2) gather the most up to a place."""
+    before = values[:-1]
+    same, less, more = before[..., 1:-1], before[..., :-2] - cost, before[..., 2:] - cost
+    came = (more > np.maximum(same, less)).astype(np.int8)
+    came -= less > np.maximum(same, more)
+    path = np.empty((values.shape[1], len(values)), dtype=np.int64)
+    for chain, last in enumerate(np.argmax(values[-1, :, 1:-1], axis=1).tolist()):
+        path[chain, -1] = column = last
+        for row in range(len(came) - 1, -1, -1):
+            column += int(came[row, chain, column])
+            path[chain, row] = column
     return path

@@ -18,6 +18,7 @@ from .edge_shapes import (
     basis,
     energy,
     fit,
+    level_weighted,
     parameters,
     peak,
     resolved,
@@ -174,7 +175,7 @@ def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
     """A model at the blur, between those that are tried, where its misfit is least."""
     shifts = shifts_within(1.5, COARSE)
     bases = subspaces(window, model, _BLURS_PX, 1.5, COARSE)
-    weighted = (means - means.mean(axis=1, keepdims=True)) * window.weight
+    weighted = level_weighted(means, window)
     captured = energy((weighted @ bases).reshape(len(means), parameters(model), -1))
     captured = captured.reshape(len(means), len(_BLURS_PX), len(shifts))
     best = captured.max(axis=2)
@@ -195,7 +196,7 @@ def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
 def typical_blur(profiles: Floats, window: Window, model: str) -> float:
     """Blur at which a model fits single rows best: a ragged toe's mean is softer than they."""
     blurs, shifts = _BLURS_PX[::2], shifts_within(2.5, COARSE)
-    weighted = (profiles - profiles.mean(axis=1, keepdims=True)) * window.weight
+    weighted = level_weighted(profiles, window)
     bases = subspaces(window, model, blurs, 2.5, COARSE)
     captured = energy((weighted @ bases).reshape(len(profiles), parameters(model), -1))
     most = captured.reshape(len(profiles), len(blurs), len(shifts)).max(axis=2)

@@ -93,7 +93,8 @@ def place_steps(plain: Floats, model: EdgeModel) -> Fit:
     shifts = shifts_within(_REACH)
     at = model.window.columns - shifts[:, None]
     bases = side_by_side(white @ basis(at, "step", model.blur))
-    return best_shifts((plain - plain.mean(axis=1, keepdims=True)) @ white.T, bases, shifts)
+    weighted = (plain - plain.mean(axis=1, keepdims=True)) @ white.T
+    return best_shifts(weighted.astype(np.float32), bases, shifts)
 
 
 def _whitening(plain: Floats, model: EdgeModel) -> Floats:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 Floats = NDArray[np.float64]
+Projected = NDArray[np.float32]
+"""Profiles and bases to be multiplied: what a fit leaves is a ten-thousandth of them or more."""
 
 MODELS: dict[str, tuple[str, ...]] = {
     "step": (),
@@ -129,7 +131,7 @@ def shifts_within(reach: float, step: float = _STEP) -> Floats:
 @cache
 def subspaces(
     window: Window, model: str, blurs: tuple[float, ...], reach: float, step: float = _STEP
-) -> Floats:
+) -> Projected:
     """Orthonormal bases of the weighted profiles side by side.
 
     Shape (window, k x blurs x shifts), the last index fastest.
@@ -139,20 +141,26 @@ def subspaces(
     return side_by_side(stacked * window.weight[None, :, None])
 
 
-def side_by_side(stacked: Floats) -> Floats:
+def side_by_side(stacked: Floats) -> Projected:
     """Orthonormal bases of a stack (n, window, k), as (window, k x n), each in its own sense."""
     bases, sizes = np.linalg.qr(stacked)
     bases = bases * np.sign(np.diagonal(sizes, axis1=1, axis2=2))[:, None, :]
-    return np.ascontiguousarray(bases.transpose(1, 2, 0).reshape(stacked.shape[1], -1))
+    return np.asarray(bases.transpose(1, 2, 0).reshape(stacked.shape[1], -1), dtype=np.float32)
 
 
 def fit(profiles: Floats, window: Window, model: str, blur: float, reach: float) -> Fit:
     """The best shift of each profile within `reach` columns, by captured energy."""
-    weighted = (profiles - profiles.mean(axis=1, keepdims=True)) * window.weight
+    weighted = level_weighted(profiles, window)
     return best_shifts(weighted, subspaces(window, model, (blur,), reach), shifts_within(reach))
 
 
-def best_shifts(weighted: Floats, bases: Floats, shifts: Floats) -> Fit:
+def level_weighted(profiles: Floats, window: Window) -> Projected:
+    """Profiles without their mean, weighted; every model has a level."""
+    level = profiles.mean(axis=1, keepdims=True)
+    return np.asarray((profiles - level) * window.weight, dtype=np.float32)
+
+
+def best_shifts(weighted: Projected, bases: Projected, shifts: Floats) -> Fit:
     """The shift at which the bases (window, k x shifts) capture most of each weighted profile.
 
     A step that falls towards the bead captures nothing.
@@ -165,15 +173,15 @@ def best_shifts(weighted: Floats, bases: Floats, shifts: Floats) -> Fit:
     return Fit(places, misfit, _STEP**2 / (-0.5 * curvature))
 
 
-def energy(projected: Floats) -> Floats:
+def energy(projected: Projected) -> Projected:
     """Sum of squares over the middle axis."""
-    return np.einsum("rkn,rkn->rn", projected, projected)
+    return np.asarray(np.einsum("rkn,rkn->rn", projected, projected), dtype=np.float32)
 
 
-def peak(captured: Floats, shifts: Floats) -> tuple[Floats, Floats, Floats]:
+def peak(captured: Projected, shifts: Floats) -> tuple[Floats, Floats, Floats]:
     """Shift of each row's most captured energy, that energy, its (negative) second difference."""
     at = np.clip(np.argmax(captured, axis=1), 1, len(shifts) - 2)
-    a, b, c = (captured[np.arange(len(at)), at + k] for k in (-1, 0, 1))
+    a, b, c = (captured[np.arange(len(at)), at + k].astype(np.float64) for k in (-1, 0, 1))
     curvature = np.minimum(a - 2 * b + c, -1e-9)
     step = shifts[1] - shifts[0]
     return shifts[at] + np.clip(0.5 * (a - c) / curvature, -1, 1) * step, b, curvature

@@ -126,7 +126,7 @@ class _Side:
         """Blur of the toe; that of single rows where their mean is soft, for a toe is ragged."""
         if model.blur <= _SHARP_PX:
             return model.blur
-        every = max(1, len(near) // _TRIED_ROWS)
+        every = -(-len(near) // _TRIED_ROWS)
         centre = np.rint(near[::every]).astype(np.int64)
         profiles = profiles_at(signal[::every], centre, self._window)
         return typical_blur(profiles, self._window, model.name)
@@ -143,22 +143,23 @@ class _Side:
 
     def _sharpest(self, signal: Signal) -> Floats:
         """Chain of the steepest rises from plate to bead near the coarse toe."""
-        smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.0)
+        smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.0)[::2]
         rise = np.gradient(smooth, axis=1)
         inward = np.abs(np.arange(signal.shape[1]) - self._reach)
         near = inward <= self._search
         typical = np.median(np.where(near, rise, 0).max(axis=1)) + 1e-6
         score = np.where(near, np.clip(rise / typical, 0, 1.5), -1e6).astype(np.float32)
-        return best_chain(score, 0.1).astype(np.float64)
+        rows = np.arange(len(signal))
+        return np.interp(rows, rows[::2], best_chain(score, 0.1))
 
     def _model(self, signal: Signal, near: Floats) -> EdgeModel:
-        every = max(1, len(near) // _TRIED_ROWS)
+        every = -(-len(near) // _TRIED_ROWS)
         centre = np.rint(near[::every]).astype(np.int64)
         return choose_model(signal[::every], centre, self._window)
 
     def _averaging(self, pick: Rows, near: Floats, model: EdgeModel) -> float:
         """Part of the longest averaging with the least expected error (Stein's estimate)."""
-        every = max(1, len(near) // _TRIED_ROWS)
+        every = -(-len(near) // _TRIED_ROWS)
         pick, centre = pick[::every], np.rint(near[::every]).astype(np.int64)
         shading, places, noise = None, [], 0.0
         for share in _SHARES:
