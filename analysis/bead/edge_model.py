@@ -33,6 +33,8 @@ EDGE_FLOOR = 0.01
 """The same as a part of the step: no real blur is quite Gaussian."""
 _CARRIES = 0.3
 """Part of the change over a toe that its step must carry, whatever lies beside it."""
+_FAR = 4.0
+"""Difference in score, in prices, from which on a model is out of the question."""
 _LIKELY = 0.2
 """Evidence, of the best model's, that a model must have to be chosen."""
 _ALIKE_PX = 0.05
@@ -74,11 +76,18 @@ def choose_model(
     Where there is shading or a line beside the step, a narrower window keeps what is farther
     away out of it.
     """
-    model = _chosen(profiles_at(signal, centre, window), centre, window)
+    means = _means(signal, centre, window)
+    model, doubt = _chosen(means, window)
     near = window.around(model.blur)
-    if model.name == "step" or near == window:
-        return model
-    return _chosen(profiles_at(signal, centre, near), centre, near)
+    if model.name != "step" and near != window:
+        window, means = near, _means(signal, centre, near)
+        model, doubt = _chosen(means, window)
+    return EdgeModel(window, model.name, model.blur, doubt, _shading(means, window, model))
+
+
+def _means(signal: NDArray[np.float32], centre: NDArray[np.int64], window: Window) -> Floats:
+    profiles = profiles_at(signal, centre, window)
+    return aligned_means(profiles, alignment(profiles, centre, window))
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +100,8 @@ class _Candidate:
     place: float
 
 
-def _chosen(profiles: Floats, centre: NDArray[np.int64], window: Window) -> EdgeModel:
-    """The likely model that would be least wrong if another one were true."""
-    means = aligned_means(profiles, alignment(profiles, centre, window))
+def _chosen(means: Floats, window: Window) -> tuple[_Candidate, float]:
+    """The likely model that would be least wrong if another one were true, and the doubt."""
     tried = _candidates(means, window)
     scores = np.array([candidate.score for candidate in tried])
     places = np.array([candidate.place for candidate in tried])
@@ -103,21 +111,29 @@ def _chosen(profiles: Floats, centre: NDArray[np.int64], window: Window) -> Edge
     good = np.flatnonzero(risks <= risks.min() + _ALIKE_PX**2)
     best = min(good, key=lambda one: (parameters(tried[one].name), risks[one]))
     moved_by = places[best] - places[0]
-    u = float(np.hypot(np.sqrt(risks[best]), _TRUST * moved_by))
-    name, blur = tried[best].name, tried[best].blur
-    return EdgeModel(window, name, blur, u, _shading(means, window, name, blur))
+    return tried[best], float(np.hypot(np.sqrt(risks[best]), _TRUST * moved_by))
 
 
 def _candidates(means: Floats, window: Window) -> list[_Candidate]:
-    """The plain step, and the models that the blur lets see and whose step carries the change."""
+    """The plain step, and the models that the blur lets see and whose step carries the change.
+
+    Those that are far less likely than the best are left out.
+    """
     plain = _candidate(means, window, "step")
-    rise = _step(means, window, plain)
-    richer = (
-        _candidate(means, window, name)
-        for name in MODELS
-        if name != plain.name and resolved(name, plain.blur)
-    )
-    return [plain, *(one for one in richer if _step(means, window, one) > _CARRIES * rise)]
+    least = _CARRIES * _step(means, window, plain)
+    names = [name for name in MODELS if name != plain.name and resolved(name, plain.blur)]
+    richer = sorted((_candidate(means, window, name) for name in names), key=_by_score)
+    kept = [plain]
+    for one in richer:
+        if one.score > min(kept, key=_by_score).score + _FAR * _price(window):
+            break
+        if _step(means, window, one) > least:
+            kept.append(one)
+    return kept
+
+
+def _by_score(candidate: _Candidate) -> float:
+    return candidate.score
 
 
 def _step(means: Floats, window: Window, candidate: _Candidate) -> float:
@@ -139,15 +155,14 @@ def alignment(profiles: Floats, centre: NDArray[np.int64], window: Window) -> Fl
     return np.asarray(gaussian_filter1d(first + centre, _CALM, mode="nearest") - centre)
 
 
-def _shading(means: Floats, window: Window, model: str, blur: float) -> Floats:
+def _shading(means: Floats, window: Window, model: _Candidate) -> Floats:
     """What a model adds to its step in each mean profile, (blocks, window).
 
     Aligned profiles have one place in common: single blocks would now and then find another.
     """
-    if model == "step":
+    if model.name == "step":
         return np.zeros_like(means)
-    place = float(np.median(fit(means, window, model, blur, 1.5).shift))
-    parts = basis(window.columns - place, model, blur)
+    parts = basis(window.columns - model.place, model.name, model.blur)
     weighted = parts * window.weight[:, None]
     found = np.linalg.lstsq(weighted, (means * window.weight).T, rcond=None)[0]
     shading = (parts[:, 2:] @ found[2:]).T

@@ -24,6 +24,7 @@ from .edge_model import (
 from .edge_shapes import (
     Fit,
     Floats,
+    Projected,
     Window,
     basis,
     best_shifts,
@@ -60,7 +61,7 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     centre = np.rint(near).astype(np.int64)
     seen = profiles_at(signal, centre, model.window)
     plain = seen - shading_along(seen, centre, model)
-    found = place_steps(plain, model)
+    found = ruler_for(plain, model).places(plain)
     shift = found.shift - _astray(plain, found.shift, model)
     return EdgePlaces(
         column=centre + shift,
@@ -87,14 +88,26 @@ def shading_along(profiles: Floats, centre: NDArray[np.int64], model: EdgeModel)
     return np.asarray((1 - part) * before + part * behind)
 
 
-def place_steps(plain: Floats, model: EdgeModel) -> Fit:
-    """The step's shift in each row without shading, by the noise of its columns."""
+@dataclass(frozen=True, slots=True)
+class Ruler:
+    """What measures steps: `white` (window, window) evens the noise, `bases` as `best_shifts`."""
+
+    white: Floats
+    bases: Projected
+    shifts: Floats
+
+    def places(self, plain: Floats) -> Fit:
+        """The step's shift in each row without shading."""
+        weighted = (plain - plain.mean(axis=1, keepdims=True)) @ self.white.T
+        return best_shifts(weighted.astype(np.float32), self.bases, self.shifts)
+
+
+def ruler_for(plain: Floats, model: EdgeModel) -> Ruler:
+    """A ruler for steps with the blur of a model among the noise of the columns of `plain`."""
     white = _whitening(plain, model)
     shifts = shifts_within(_REACH)
     at = model.window.columns - shifts[:, None]
-    bases = side_by_side(white @ basis(at, "step", model.blur))
-    weighted = (plain - plain.mean(axis=1, keepdims=True)) @ white.T
-    return best_shifts(weighted.astype(np.float32), bases, shifts)
+    return Ruler(white, side_by_side(white @ basis(at, "step", model.blur)), shifts)
 
 
 def _whitening(plain: Floats, model: EdgeModel) -> Floats:

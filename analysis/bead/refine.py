@@ -13,8 +13,8 @@ from seamlog.errors import EvidenceError
 from .chain import best_chain
 from .curve import Centreline
 from .edge_model import EdgeModel, choose_model, profiles_at, typical_blur
-from .edge_places import EdgePlaces, locate_edges, place_steps, random_u, shading_along
-from .edge_shapes import Window
+from .edge_places import EdgePlaces, locate_edges, random_u, ruler_for, shading_along
+from .edge_shapes import Fit, Window
 from .image import Photo
 from .plane import Plane
 from .sampling import sample_offsets
@@ -35,6 +35,7 @@ _CALM = 1.5
 must lie along a straight line."""
 _WINDOW_PX = 18
 _TRIED_ROWS = 160
+_GOLDEN = (np.sqrt(5) - 1) / 2
 _SENSOR_PX = 0.04
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
 _RASTER_PX = 0.02
@@ -96,7 +97,7 @@ class _Side:
         self._signal = _mixed(pixels, direction)
 
     def _direction(self, pixels: Signal, depth: int) -> tuple[Floats, float]:
-        rows = np.linspace(0, len(pixels) - 1, min(len(pixels), _TRIED_ROWS)).astype(np.int64)
+        rows = _tried(len(pixels))
         smooth, valid = averaged_at(pixels, rows, self._longest), self._valid[rows]
         groups = []
         for first in (self._reach + 1, self._reach - depth + 1):
@@ -126,9 +127,8 @@ class _Side:
         """Blur of the toe; that of single rows where their mean is soft, for a toe is ragged."""
         if model.blur <= _SHARP_PX:
             return model.blur
-        every = -(-len(near) // _TRIED_ROWS)
-        centre = np.rint(near[::every]).astype(np.int64)
-        profiles = profiles_at(signal[::every], centre, self._window)
+        rows = _tried(len(near))
+        profiles = profiles_at(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
         return typical_blur(profiles, self._window, model.name)
 
     def _smeared(self, places: EdgePlaces, share: float, every: int) -> float:
@@ -153,24 +153,23 @@ class _Side:
         return np.interp(rows, rows[::2], best_chain(score, 0.1))
 
     def _model(self, signal: Signal, near: Floats) -> EdgeModel:
-        every = -(-len(near) // _TRIED_ROWS)
-        centre = np.rint(near[::every]).astype(np.int64)
-        return choose_model(signal[::every], centre, self._window)
+        rows = _tried(len(near))
+        return choose_model(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
 
     def _averaging(self, pick: Rows, near: Floats, model: EdgeModel) -> float:
         """Part of the longest averaging with the least expected error (Stein's estimate)."""
-        every = -(-len(near) // _TRIED_ROWS)
-        pick, centre = pick[::every], np.rint(near[::every]).astype(np.int64)
-        shading, places, noise = None, [], 0.0
+        rows = _tried(len(near))
+        pick, centre = pick[rows], np.rint(near[rows]).astype(np.int64)
+        found: list[Fit] = []
         for share in _SHARES:
             signal = averaged_at(self._signal, pick, share * self._longest)
             seen = profiles_at(signal, centre, model.window)
-            if shading is None:
+            if not found:
                 shading = shading_along(seen, centre, model)
-            found = place_steps(seen - shading, model)
-            places.append(centre + found.shift)
-            noise = float(np.median(random_u(found, model.window))) ** 2
-        return _least_risk(np.array(places), np.array(_SHARES), noise)
+            found.append(ruler_for(seen - shading, model).places(seen - shading))
+        places = np.array([centre + one.shift for one in found])
+        noise = float(np.median(random_u(found[-1], model.window))) ** 2
+        return _least_risk(places, np.array(_SHARES), noise)
 
     def _toes(
         self, places: EdgePlaces, smeared: float, share: float, pick: Rows, soft_px: float
@@ -195,6 +194,14 @@ class _Side:
             model=places.model,
             blur_px=soft_px,
         )
+
+
+def _tried(count: int) -> Rows:
+    """Rows to try things on, spread unevenly: a ripple must not keep step with them."""
+    if count <= _TRIED_ROWS:
+        return np.arange(count)
+    at = np.arange(_TRIED_ROWS)
+    return np.asarray((at + at * _GOLDEN % 1.0) * count / _TRIED_ROWS, dtype=np.int64)
 
 
 def _mixed(pixels: Signal, direction: Floats) -> Signal:

@@ -72,7 +72,7 @@ def sample_offsets(
         part,
         ((x - left + 0.5) / factor - 0.5).astype(np.float32),
         ((y - top + 0.5) / factor - 0.5).astype(np.float32),
-        cv2.INTER_CUBIC,
+        cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
     )
     return opponent(sampled), valid

@@ -34,7 +34,7 @@ _ENOUGH = 40
 """Stations from which on a band inside is looked for."""
 _BEYOND = {"metal": 0.06, "outer": 0.25}
 """Half widths beside a toe, by its definition, that are neither bead nor plate at first."""
-_SECTIONS = 32
+_SECTIONS = 24
 """Sections in which the band along a given path is looked for."""
 
 
@@ -225,7 +225,7 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     weight = np.append(nearness, nearness[-1:])
     every = max(2, len(features) // _SECTIONS)
     sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
-    band = BandSearch(sections, 3.0, 0.7 * features.shape[1]).best(weight)
+    band = BandSearch(sections, 3.0, 0.7 * features.shape[1], ratio=1.25).best(weight)
     if band is None:
         raise EvidenceError(
             f"{photo.name}: no bead can be told from the plate along the given path; check that "
