@@ -63,9 +63,9 @@ def sample_offsets(
     left, right = _span(x, photo.width_px)
     top, bottom = _span(y, photo.height_px)
     part = photo.pixels[top:bottom, left:right]
-    factor = min(max(1, int(blur)), *part.shape[:2])
-    if factor > 1:
-        part = _averaged(part, factor)
+    factor = 1
+    while 2 * factor <= blur and min(part.shape[:2]) >= 2:
+        part, factor = _halved(part), 2 * factor
     if blur / factor > 1.3:
         part = cv2.GaussianBlur(part, (0, 0), 0.4 * blur / factor)
     sampled = cv2.remap(
@@ -78,10 +78,10 @@ def sample_offsets(
     return opponent(sampled), valid
 
 
-def _averaged(pixels: NDArray[Any], factor: int) -> NDArray[Any]:
-    """Means of whole blocks of factor x factor pixels; what is over at the far borders goes."""
-    rows, columns = (size // factor for size in pixels.shape[:2])
-    whole = pixels[: rows * factor, : columns * factor]
+def _halved(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Means of whole blocks of 2 x 2 pixels; what is over at the far borders goes."""
+    rows, columns = (size // 2 for size in pixels.shape[:2])
+    whole = pixels[: 2 * rows, : 2 * columns]
     return cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA)
 
 
