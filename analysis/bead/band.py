@@ -143,13 +143,19 @@ class BandSearch:
         """The band with the most evidence, or None without any.
 
         `allowed`, shape (columns + 1,) or (rows, columns + 1), multiplies the evidence by the
-        band's centre; `widest` leaves broader ones out.
+        band's centre, or by its width as well (`holding`); `widest` leaves broader ones out.
         """
         keep = 2 * self._halves <= max(widest, 2 * self._halves[0])
         score = self._evidence[:, :, keep]
         if allowed is not None:
-            score = score * (allowed if allowed.ndim == 2 else allowed[None])[:, :, None]
+            by_row = allowed if allowed.ndim > 1 else allowed[None]
+            score = score * (by_row if allowed.ndim == 3 else by_row[:, :, None])
         return _trace(score, self._centres, self._halves[keep], self._slope)
+
+    def holding(self, column: float, slack: float) -> Floats:
+        """Weight of bands that hold a column, (1, columns + 1, widths): 1, or less beside it."""
+        beside = np.abs(self._centres[:, None] - np.float32(column)) - self._halves
+        return np.exp(-0.5 * (np.maximum(beside, 0) / np.float32(slack)) ** 2)[None]
 
     def _score(self, features: Features) -> Floats:
         """Evidence per section, centre and half width, shape (rows, centres, halves)."""

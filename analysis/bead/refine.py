@@ -34,7 +34,9 @@ _CALM = 1.5
 """Windows follow the coarse toe averaged over this many longest averagings: what they average
 must lie along a straight line."""
 _WINDOW_PX = 18
-_TRIED_ROWS = 160
+_MODEL_ROWS = 512
+"""Rows from which a toe's model is made at most, and from which the averaging along it is."""
+_TRIED_ROWS = 200
 _GOLDEN = (np.sqrt(5) - 1) / 2
 _SENSOR_PX = 0.04
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
@@ -42,6 +44,8 @@ _RASTER_PX = 0.02
 """Standard uncertainty that the raster and the unknown shape of the blur leave at the longest."""
 _SHARP_PX = 2.0
 """Blur up to which a toe is not looked at twice."""
+_MOST_SMEARED = 2.5
+"""Waviness that was lost, in parts of what one more smoothing takes, at most."""
 _ENOUGH = 64
 
 
@@ -97,7 +101,7 @@ class _Side:
         self._signal = _mixed(pixels, direction)
 
     def _direction(self, pixels: Signal, depth: int) -> tuple[Floats, float]:
-        rows = _tried(len(pixels))
+        rows = _tried(len(pixels), _TRIED_ROWS)
         smooth, valid = averaged_at(pixels, rows, self._longest), self._valid[rows]
         groups = []
         for first in (self._reach + 1, self._reach - depth + 1):
@@ -127,19 +131,26 @@ class _Side:
         """Blur of the toe; that of single rows where their mean is soft, for a toe is ragged."""
         if model.blur <= _SHARP_PX:
             return model.blur
-        rows = _tried(len(near))
+        rows = _tried(len(near), _MODEL_ROWS)
         profiles = profiles_at(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
         return typical_blur(profiles, self._window, model.name)
 
     def _smeared(self, places: EdgePlaces, share: float, every: int) -> float:
         """Px of the toe's own waviness that blur and averaging take away, rms.
 
-        About what one more smoothing would take. Giving it back by deconvolution was tried: on
-        a textured plate it amplifies more noise than it restores.
+        One more smoothing takes less than they did, by as much as yet another one takes less
+        than it. Giving it back by deconvolution was tried: on a textured plate it amplifies more
+        noise than it restores.
         """
-        sigma = np.hypot(places.blur_px / self._row_px, share * self._longest) / every
-        wave = places.column
-        return float(np.std(wave - gaussian_filter1d(wave, sigma, mode="nearest")))
+        averaged = share * self._longest
+        sigma = np.hypot(places.blur_px / self._row_px, averaged)
+        taken = places.column - _slow(places.column, sigma / every)
+        again = _slow(taken, sigma / every)
+        more = np.clip(np.std(taken) / max(float(np.std(again)), 1e-6), 1.0, _MOST_SMEARED)
+        wide = (sigma / averaged) ** 2
+        passed = 1 - 2 / np.sqrt(1 + wide / 2) + 1 / np.sqrt(1 + wide)
+        noise = passed * float(np.median(places.u_noise)) ** 2
+        return float(np.sqrt(max(float(np.var(taken)) - noise, 0.0)) * more)
 
     def _sharpest(self, signal: Signal) -> Floats:
         """Chain of the steepest rises from plate to bead near the coarse toe."""
@@ -153,12 +164,12 @@ class _Side:
         return np.interp(rows, rows[::2], best_chain(score, 0.1))
 
     def _model(self, signal: Signal, near: Floats) -> EdgeModel:
-        rows = _tried(len(near))
+        rows = _tried(len(near), _MODEL_ROWS)
         return choose_model(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
 
     def _averaging(self, pick: Rows, near: Floats, model: EdgeModel) -> float:
         """Part of the longest averaging with the least expected error (Stein's estimate)."""
-        rows = _tried(len(near))
+        rows = _tried(len(near), _TRIED_ROWS)
         pick, centre = pick[rows], np.rint(near[rows]).astype(np.int64)
         found: list[Fit] = []
         for share in _SHARES:
@@ -184,7 +195,8 @@ class _Side:
         return Toes(
             offset=followed.astype(np.float64) - self._side * self._unit * inward,
             u_noise=places.u_noise * self._unit,
-            u_model=np.sqrt(places.u_model**2 + smeared**2 + _RASTER_PX**2) * self._unit,
+            u_model=np.hypot(places.u_model, _RASTER_PX) * self._unit,
+            smeared=smeared * self._unit,
             height=places.height,
             bare=places.bare,
             in_frame=self._valid[pick][rows, outside],
@@ -196,12 +208,16 @@ class _Side:
         )
 
 
-def _tried(count: int) -> Rows:
+def _tried(count: int, most: int) -> Rows:
     """Rows to try things on, spread unevenly: a ripple must not keep step with them."""
-    if count <= _TRIED_ROWS:
+    if count <= most:
         return np.arange(count)
-    at = np.arange(_TRIED_ROWS)
-    return np.asarray((at + at * _GOLDEN % 1.0) * count / _TRIED_ROWS, dtype=np.int64)
+    at = np.arange(most)
+    return np.asarray((at + at * _GOLDEN % 1.0) * count / most, dtype=np.int64)
+
+
+def _slow(values: Floats, sigma: float) -> Floats:
+    return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
 
 
 def _mixed(pixels: Signal, direction: Floats) -> Signal:

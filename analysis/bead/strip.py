@@ -34,7 +34,9 @@ _ENOUGH = 40
 """Stations from which on a band inside is looked for."""
 _BEYOND = {"metal": 0.06, "outer": 0.25}
 """Half widths beside a toe, by its definition, that are neither bead nor plate at first."""
-_SECTIONS = 24
+_ASIDE = 0.03
+"""How far beside the bead a given path may run, as a part of the columns looked at."""
+_SECTIONS = 32
 """Sections in which the band along a given path is looked for."""
 
 
@@ -221,11 +223,11 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     line = fit_centreline(prior, step, 6 * step)
     strip = sample_strip(photo, plane, line, reach, step, blur=step / unit)
     features = stack_texture(strip.opponent, 1.5)
-    nearness = np.exp(-0.5 * (strip.offsets / (0.4 * reach)) ** 2).astype(np.float32)
-    weight = np.append(nearness, nearness[-1:])
     every = max(2, len(features) // _SECTIONS)
     sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
-    band = BandSearch(sections, 3.0, 0.7 * features.shape[1], ratio=1.25).best(weight)
+    columns = features.shape[1]
+    search = BandSearch(sections, 3.0, 0.7 * columns, ratio=1.25)
+    band = search.best(search.holding(columns / 2, _ASIDE * columns))
     if band is None:
         raise EvidenceError(
             f"{photo.name}: no bead can be told from the plate along the given path; check that "

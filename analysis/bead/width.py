@@ -37,16 +37,17 @@ class BandEvidence:
 class Toes:
     """One side's toes, a value per station: offset and its uncertainties in the plane's unit.
 
-    `height` is the step from plate to bead (grey levels), `bare` that without the shading
-    beside it, `in_frame` whether the plate beyond is
-    in the photo, `present` how much the inside looks like bead, `disagreement` the distance
-    between the sharpest edge and where the looks change. `distance` is how far bead and plate are
-    apart at this toe, in standard deviations.
+    `smeared` is the part of its own waviness that blur and averaging took, rms. `height` is the
+    step from plate to bead (grey levels), `bare` that without the shading beside it, `in_frame`
+    whether the plate beyond is in the photo, `present` how much the inside looks like bead,
+    `disagreement` the distance between the sharpest edge and where the looks change. `distance`
+    is how far bead and plate are apart at this toe, in standard deviations.
     """
 
     offset: Floats
     u_noise: Floats
     u_model: Floats
+    smeared: float
     height: Floats
     bare: Floats
     in_frame: NDArray[np.bool_]
@@ -172,11 +173,15 @@ def _strays(offset: Floats, typical: float, line: Centreline) -> NDArray[np.bool
 
 
 def _u_width(left: Toes, right: Toes, u_noise: Floats, width: Floats, plane: Plane) -> Floats:
-    """Standard uncertainty: noise, edge model (both toes, rectangular), scale, plane residual."""
+    """Standard uncertainty: noise, edge model (both toes, rectangular), scale, plane residual.
+
+    What waviness was smoothed away adds up: the ripples of a bead push both toes out at once.
+    """
     model = np.hypot(left.u_model, right.u_model) / np.sqrt(3)
     scale = plane.scale_relative_u * width
     residual = plane.residual * np.sqrt(2)
-    return np.asarray(np.sqrt(u_noise**2 + model**2 + scale**2 + residual**2))
+    smeared = left.smeared + right.smeared
+    return np.asarray(np.sqrt(u_noise**2 + model**2 + smeared**2 + scale**2 + residual**2))
 
 
 def _evidence(
