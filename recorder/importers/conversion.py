@@ -38,6 +38,7 @@ _NS["datenum"] = _NS["d"]
 _DATENUM_OF_1970 = 719_529
 _LAST_NS = (1 << 63) - 1
 _COARSE_NS = 100.0
+_LONGEST_TABLE_M = 20.0
 _EMPTY = {"float64": np.nan, "float32": np.nan}
 
 
@@ -100,11 +101,21 @@ def convert(
             missing = int(np.isnan(values[name].astype(np.float64)).sum())
             if missing:
                 loss.missing_values[f"{topic} {name}"] = missing
+            span = _span_m(topic, name, values[name])
+            if span > _LONGEST_TABLE_M:
+                loss.notes.append(f"{topic} {name} spans {span:.4g} m: is its unit right?")
             digits = _rounded(values[name])
             if digits:
                 loss.notes.append(f"{topic} {name} has {digits} significant digits")
         topics[topic] = TopicColumns(values, metadata, channel)
     return topics, loss
+
+
+def _span_m(topic: str, name: str, values: NDArray[Any]) -> float:
+    """How far a position of the table goes; 0 for everything else."""
+    if topic.startswith(FREE) or name != "position_m" or np.isnan(values).all():
+        return 0.0
+    return float(np.nanmax(values) - np.nanmin(values))
 
 
 def _used(mapping: ColumnMap) -> set[str | None]:

@@ -1,5 +1,6 @@
 """Parquet tables."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -23,24 +24,27 @@ class ParquetImporter:
         import pyarrow.parquet as pq
 
         try:
-            table = pq.read_table(path)
+            table = pq.ParquetFile(path).read()
             while any(pa.types.is_struct(field.type) for field in table.schema):
                 table = table.flatten()
         except (pa.ArrowException, OSError) as error:
             raise ImportFailed(f"{path} cannot be read as a Parquet file: {error}") from error
         content = Content({}, notes=[])
         columns: dict[str, NDArray[Any]] = {}
+        seen: Counter[str] = Counter()
         for field, column in zip(table.schema, table.columns, strict=True):
-            if _add_elements(field.name, column, columns):
+            seen[field.name] += 1
+            name = field.name + (f".{seen[field.name]}" if seen[field.name] > 1 else "")
+            if _add_elements(name, column, columns):
                 continue
-            values = _values(field.name, column, content)
+            values = _values(name, column, content)
             if values is None:
-                content.notes.append(f"column {field.name!r} holds {field.type} and was left out")
+                content.notes.append(f"column {name!r} holds {field.type} and was left out")
                 continue
-            columns[field.name] = values
+            columns[name] = values
             unit = (field.metadata or {}).get(b"unit")
             if unit:
-                content.units[field.name] = unit.decode(errors="replace")
+                content.units[name] = unit.decode(errors="replace")
         if not columns or not table.num_rows:
             raise ImportFailed(f"{path} has no column of numbers")
         content.columns = columns
@@ -66,17 +70,26 @@ def _values(name: str, column: Any, content: Content) -> NDArray[Any] | None:
     import pyarrow as pa
 
     kind = column.type
+    if pa.types.is_temporal(kind) and column.null_count:
+        row = column.is_null().to_pylist().index(True) + 1
+        content.notes.append(f"column {name!r} holds times, but none in row {row}")
+        return None
+    if pa.types.is_time(kind):
+        content.notes.append(f"column {name!r} holds times of day: ns since midnight")
+        content.units[name] = "ns"
+        return np.asarray(column.cast(pa.time64("ns")).cast(pa.int64()).to_numpy())
+    if pa.types.is_date(kind):
+        column = column.cast(pa.timestamp("s"))
+        kind = column.type
     if pa.types.is_timestamp(kind):
         if kind.tz is None:
             content.notes.append(f"column {name!r} has no time zone and was taken as UTC")
-        if column.null_count:
-            return None
         content.units[name] = "ns"
         return np.asarray(column.cast(pa.timestamp("ns"), safe=False).cast(pa.int64()).to_numpy())
     if pa.types.is_dictionary(kind):
         column = column.cast(kind.value_type)
         kind = column.type
-    if pa.types.is_duration(kind) and not column.null_count:
+    if pa.types.is_duration(kind):
         content.units[name] = "ns"
         return np.asarray(column.cast(pa.duration("ns"), safe=False).cast(pa.int64()).to_numpy())
     if pa.types.is_decimal(kind):

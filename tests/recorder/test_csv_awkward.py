@@ -260,6 +260,11 @@ def test_a_unit_that_no_field_has_is_not_taken_for_metres(tmp_path: Path, capsys
 POSITION_DEG = POSITION.replace('"x"', '"x [deg]"')
 
 
+def test_a_table_longer_than_a_hall_is_doubted(tmp_path: Path, capsys: Any) -> None:
+    _, told = imported(tmp_path, counted("{i},{j}00"), POSITION, capsys)
+    assert "/table/encoder position_m spans 500 m: is its unit right?" in told["notes"]
+
+
 def test_values_that_a_field_cannot_hold_are_refused(tmp_path: Path, capsys: Any) -> None:
     mapping = '[time]\ncolumn = "t"\n[channels."/events".fields]\nkind.column = "x"\n'
     code, told = imported(tmp_path, counted("{i},{j}.5"), mapping, capsys)

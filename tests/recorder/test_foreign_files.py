@@ -252,6 +252,26 @@ def test_parquet_columns_are_read(tmp_path: Path) -> None:
     assert any("'s'" in note for note in content.notes)
 
 
+def test_dates_times_and_names_that_come_twice_in_parquet(tmp_path: Path) -> None:
+    arrays = [
+        pa.array([19_786, 19_787], pa.date32()),
+        pa.array([1_500, 2_500], pa.time32("ms")),
+        pa.array([1, 2]),
+        pa.array([3, 4]),
+        pa.array([1_000, None], pa.timestamp("us")),
+    ]
+    table = pa.table(arrays, names=["day", "clock", "x", "x", "holes"])
+    pq.write_table(table, tmp_path / "x.parquet")
+    content = ParquetImporter().load(tmp_path / "x.parquet")
+    assert {name: column.tolist() for name, column in content.columns.items()} == {
+        "day": [19_786 * 86_400 * 10**9, 19_787 * 86_400 * 10**9],
+        "clock": [1_500_000_000, 2_500_000_000],
+        "x": [1, 2],
+        "x.2": [3, 4],
+    }
+    assert "column 'holes' holds times, but none in row 2" in content.notes
+
+
 @pytest.mark.parametrize(("codec", "suffix"), [("mpeg4", "mp4"), ("mjpeg", "mkv")])
 def test_frames_keep_the_time_stamps_of_the_video(tmp_path: Path, codec: str, suffix: str) -> None:
     times_ms = [0, 40, 90, 200]
