@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from seamlog.evenness import Evenness
 
     from .content import Content, Report
-    from .conversion import Loss, TopicColumns
+    from .conversion import TopicColumns
+    from .loss import Loss
 
 BY_SUFFIX = {
     "csv": "csv txt tsv dat asc lvm",

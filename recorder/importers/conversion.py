@@ -6,9 +6,7 @@ clocks make them, are counted.
 """
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,7 @@ from numpy.typing import NDArray
 
 from seamlog.channels import STAMP, Channel, Field
 from seamlog.errors import ImportFailed
-from seamlog.evenness import Evenness, evenness_of
+from seamlog.evenness import evenness_of
 
 from .column_map import (
     FREE,
@@ -25,20 +23,14 @@ from .column_map import (
     ColumnMap,
     FieldMap,
     ScalarColumn,
-    TimeMap,
     channel_of,
     mappable,
 )
 from .content import Content
+from .loss import Loss
+from .stamps import Columns, coarse_times, stamps_of, time_of
 from .units import factor_between, spelled
 
-Columns = Mapping[str, NDArray[Any]]
-_NS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0, "min": 60e9, "h": 3600e9, "d": 86400e9}
-_NS["datenum"] = _NS["d"]
-_DATENUM_OF_1970 = 719_529
-_LAST_NS = (1 << 63) - 1
-_COARSE_NS = 100.0
-_LONGEST_TABLE_M = 20.0
 _EMPTY = {"float64": np.nan, "float32": np.nan}
 
 
@@ -49,19 +41,6 @@ class TopicColumns:
     columns: dict[str, NDArray[Any]]
     metadata: dict[str, str]
     channel: Channel
-
-
-@dataclass
-class Loss:
-    """What an import took over and what it left: names by topic, counts of missing values."""
-
-    rows: int
-    not_imported: list[str]
-    absent: dict[str, list[str]] = field(default_factory=dict)
-    missing_values: dict[str, int] = field(default_factory=dict)
-    timing: dict[str, Evenness] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    losses: list[str] = field(default_factory=list)
 
 
 def convert(
@@ -82,9 +61,9 @@ def convert(
     topics = {}
     for topic, entry in mapping.channels.items():
         channel = channel_of(topic, entry)
-        stamp_ns = _stamps(columns, _time_of(topic, entry, mapping, times, path), entry, path)
+        stamp_ns = stamps_of(columns, time_of(topic, entry, mapping, times, path), entry, path)
         loss.rows = max(loss.rows, len(stamp_ns))
-        loss.notes += _coarse(columns, entry.time or mapping.time)
+        loss.notes += coarse_times(columns, entry.time or mapping.time)
         timing = evenness_of(stamp_ns)
         if timing:
             loss.timing[topic] = timing
@@ -98,24 +77,9 @@ def convert(
             loss.absent[topic] = absent
             metadata["absent"] = ",".join(absent)
         for name in entry.fields:
-            missing = int(np.isnan(values[name].astype(np.float64)).sum())
-            if missing:
-                loss.missing_values[f"{topic} {name}"] = missing
-            span = _span_m(topic, name, values[name])
-            if span > _LONGEST_TABLE_M:
-                loss.notes.append(f"{topic} {name} spans {span:.4g} m: is its unit right?")
-            digits = _rounded(values[name])
-            if digits:
-                loss.notes.append(f"{topic} {name} has {digits} significant digits")
+            loss.tell(topic, name, values[name])
         topics[topic] = TopicColumns(values, metadata, channel)
     return topics, loss
-
-
-def _span_m(topic: str, name: str, values: NDArray[Any]) -> float:
-    """How far a position of the table goes; 0 for everything else."""
-    if topic.startswith(FREE) or name != "position_m" or np.isnan(values).all():
-        return 0.0
-    return float(np.nanmax(values) - np.nanmin(values))
 
 
 def _used(mapping: ColumnMap) -> set[str | None]:
@@ -125,112 +89,6 @@ def _used(mapping: ColumnMap) -> set[str | None]:
     maps = [mapping.time, *(entry.time for entry in mapping.channels.values())]
     times = [time.column for time in maps if time]
     return {*times, *(item.column for item in fields), *scalars}
-
-
-def _rounded(values: NDArray[Any]) -> int | None:
-    """Significant digits of values that are rounded to four or fewer; None for others."""
-    found = (
-        np.unique(values[np.isfinite(values) & (values != 0)]) if values.ndim == 1 else values[:0]
-    )
-    if len(found) < 50:
-        return None
-    scale = 10.0 ** np.floor(np.log10(np.abs(found)))
-    for digits in (2, 3, 4):
-        step = 10.0 ** (digits - 1)
-        if np.allclose(np.rint(found / scale * step) / step * scale, found, rtol=1e-9, atol=0):
-            return digits
-    return None
-
-
-def _time_of(
-    topic: str, entry: ChannelMap, mapping: ColumnMap, times: Mapping[str, str], path: Path
-) -> TimeMap:
-    given = entry.time or mapping.time
-    if given is not None:
-        return given
-    named = [item.column for item in entry.fields.values() if item.column]
-    stated = {times[name] for name in named if name in times}
-    if len(stated) == 1:
-        return TimeMap(column=stated.pop(), unit="ns")
-    if stated:
-        raise ImportFailed(
-            f"{path}: the columns of {topic} have different times ({', '.join(sorted(stated))}); "
-            "map them to topics of their own, or give time.column"
-        )
-    raise ImportFailed(
-        f"{path}: nothing says when the rows of {topic} were: the file has no time for them; give "
-        "[time] with column, or with rate_hz and start"
-    )
-
-
-def _coarse(columns: Columns, time: TimeMap | None) -> list[str]:
-    """A note where float64 holds the times more coarsely than in ns."""
-    if time is None or time.column is None or columns[time.column].dtype.kind != "f":
-        return []
-    step_ns = float(np.spacing(np.abs(columns[time.column]).max())) * _NS[time.unit]
-    if step_ns < _COARSE_NS:
-        return []
-    return [f"time column {time.column!r}: float64 holds such times in steps of {step_ns:.2g} ns"]
-
-
-def _stamps(columns: Columns, time: TimeMap, entry: ChannelMap, path: Path) -> NDArray[np.int64]:
-    since = time.start - datetime(1970, 1, 1, tzinfo=UTC)
-    start_ns = (since.days * 86400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
-    if time.column is None:
-        return start_ns + _even_ns(time, _row_count(columns, entry, path))
-    values = np.asarray(columns[time.column])
-    if values.ndim != 1 or not len(values):
-        raise ImportFailed(f"{path}: time column {time.column!r} is no column but a single number")
-    if values.dtype.kind not in "iuf":
-        raise ImportFailed(f"{path}: time column {time.column!r} holds no numbers")
-    if time.unit == "datenum":
-        values = values - _DATENUM_OF_1970
-    seconds = values.astype(np.float64)
-    bad = np.flatnonzero(~np.isfinite(seconds))
-    if len(bad):
-        raise ImportFailed(
-            f"{path}: time column {time.column!r} has no value in row {bad[0] + 1}; "
-            "remove such rows or map time by rate_hz"
-        )
-    if np.abs(seconds).max() * _NS[time.unit] + start_ns > _LAST_NS:
-        raise ImportFailed(
-            f"{path}: time column {time.column!r} reaches {np.abs(seconds).max():g} {time.unit}, "
-            "which is no time between 1970 and 2262; check its unit"
-        )
-    exact = values.dtype.kind in "iu"
-    scaled = values * int(_NS[time.unit]) if exact else np.rint(seconds * _NS[time.unit])
-    stamp_ns = start_ns + scaled.astype(np.int64)
-    _require_increasing(stamp_ns, time.column, path)
-    return stamp_ns
-
-
-def _require_increasing(stamp_ns: NDArray[np.int64], column: str, path: Path) -> None:
-    steps = np.diff(stamp_ns)
-    back = np.flatnonzero(steps < 0)
-    if not len(back) and (steps == 0).sum() * 2 > len(steps):
-        back = np.flatnonzero(steps == 0)
-    if len(back):
-        row = int(back[0]) + 2
-        raise ImportFailed(
-            f"{path}: time column {column!r} does not increase in row {row} "
-            f"({len(back)} such row{'s' if len(back) > 1 else ''}); sort or clean the file, "
-            "or map time by rate_hz"
-        )
-    if int(stamp_ns[0]) < 0:
-        raise ImportFailed(f"{path}: time column {column!r} begins before 1970; give time.start")
-
-
-def _even_ns(time: TimeMap, rows: int) -> NDArray[np.int64]:
-    assert time.rate_hz is not None
-    stamp_ns: NDArray[np.int64] = np.rint(np.arange(rows) * (1e9 / time.rate_hz)).astype(np.int64)
-    return stamp_ns
-
-
-def _row_count(columns: Columns, entry: ChannelMap, path: Path) -> int:
-    for item in entry.fields.values():
-        if item.column is not None and columns[item.column].ndim == 1:
-            return len(columns[item.column])
-    raise ImportFailed(f"{path}: the map names no column with rows, only constants")
 
 
 def _fields(
