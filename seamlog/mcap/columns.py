@@ -147,18 +147,17 @@ class ChannelDecoder:
         places: NDArray[np.int64] | None,
         rooms: Mapping[str, NDArray[Any]],
     ) -> None:
-        where: Any = slice(None) if places is None else places
         self._seen += rows.count
-        rooms[LOG_TIME][where] = rows.log_times_ns()
+        _put(rooms[LOG_TIME], places, rows.log_times_ns())
         leaves = {leaf.name: leaf for leaf in shape.leaves}
         for wished in self._wishes:
             leaf, room = leaves[wished.field], rooms[wished.name]
             if wished.place is None:
-                room[where] = leaf.read(rows)
+                _put(room, places, leaf.read(rows))
             elif leaf.element is not None and wished.place < leaf.count:
-                room[where] = leaf.element(wished.place)(rows)
+                _put(room, places, leaf.element(wished.place)(rows))
             else:
-                room[where] = _missing(room)
+                room[slice(None) if places is None else places] = _missing(room)
 
     def _decode_all(self, batch: Batch, rooms: Mapping[str, NDArray[Any]]) -> None:
         self._shapes.clear()
@@ -176,6 +175,14 @@ class ChannelDecoder:
         """What was decoded, `log_time_ns` first, in file order."""
         arrays = {LOG_TIME: self._log_times.array()}
         return arrays | {name: column.array() for name, column in self._columns.items()}
+
+
+def _put(room: NDArray[Any], places: NDArray[np.int64] | None, values: NDArray[Any]) -> None:
+    """Values of a batch into their places; numpy scatters what is contiguous twice as fast."""
+    if places is None:
+        room[:] = values
+    else:
+        room[places] = np.ascontiguousarray(values)
 
 
 def _missing(room: NDArray[Any]) -> Any:

@@ -249,7 +249,10 @@ def _with_stamp(columns: Columns, fields: Sequence[str] | None) -> Columns:
     if STAMP not in columns and found:
         seconds, rest = (columns[name] for name in found)
         if seconds.dtype.kind in "iu" and rest.dtype.kind in "iu":
-            columns[STAMP] = seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
+            stamps = seconds.astype(np.int64)
+            stamps *= 1_000_000_000
+            stamps += rest.view(f"i{rest.itemsize}") if rest.itemsize == 8 else rest
+            columns[STAMP] = stamps
     if fields is None:
         return columns
     kept = (LOG_TIME, STAMP, *fields)

@@ -150,6 +150,12 @@ def test_chunks_are_read_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert columns["joints.name"].tolist() == [[joint.name for joint in r.joints] for r in rows]
 
 
+def test_long_messages_among_short_ones(tmp_path: Path) -> None:
+    rows = [All(one_string="x" * size, one_int32=size) for size in (3, 70_000, 3, 66_000, 70_000)]
+    path = write(tmp_path / "x.mcap", [r.SerializeToString() for r in rows], ALL_FILES, "test.All")
+    assert read(path, ["one_int32"])["one_int32"].tolist() == [3, 70_000, 3, 66_000, 70_000]
+
+
 def test_one_field_can_be_picked(tmp_path: Path) -> None:
     payloads = [joints(place, 2).SerializeToString() for place in range(5)]
     path = write(tmp_path / "x.mcap", payloads, JOINT_FILES, "test.JointStates")
