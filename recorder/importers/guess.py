@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.channels import CHANNELS
+from seamlog.errors import ImportFailed
 
 from .content import Content
 from .units import TIMES, factor_between, is_unit, spelled
@@ -50,6 +51,12 @@ def guess(content: Content, path: Path) -> str:
     lines = [f"# Proposed for {path.name}. Look at each line before you use it."]
     lines += _time_lines(time, columns, content)
     left = [name for name in columns if name != time and name not in content.times.values()]
+    rows = len(columns[time]) if time is not None else 0
+    odd = [name for name in left if rows and len(columns[name]) != rows]
+    left = [name for name in left if name not in odd]
+    if not left:
+        why = [f"{path} has no column of numbers that goes with its time {time!r}", *content.notes]
+        raise ImportFailed("; ".join(why))
     taken: dict[tuple[str, str], list[str]] = {}
     for topic, field, pattern in _RULES:
         found = [name for name in left if re.search(pattern, _bare(name), re.I)]
@@ -63,6 +70,7 @@ def guess(content: Content, path: Path) -> str:
             if owner == topic:
                 lines += _field_lines(field, found, topic, content)
     lines += _free_lines(left, columns, content, path)
+    lines += [f"# {name}: {len(columns[name])} values, {rows} times, not mapped" for name in odd]
     return "\n".join(lines) + "\n"
 
 
@@ -126,7 +134,9 @@ def _time_lines(
     for epoch, (unit_of_epoch, low, high, who) in _EPOCHS.items():
         if unit == unit_of_epoch and low <= first < high:
             return [*lines, f"start = {epoch}T00:00:00Z  # guessed: as {who} count"]
-    if first * _SECONDS[unit] < 9e8:
+    if first < 0:
+        lines.append("start = 1970-01-02T00:00:00Z  # times begin before 0: say when 0 was")
+    elif first * _SECONDS[unit] < 9e8:
         lines.append("start = 1970-01-01T00:00:00Z  # the file does not say when it began")
     return lines
 

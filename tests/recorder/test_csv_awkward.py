@@ -188,6 +188,7 @@ GUESSES = {
     "spreadsheet days": (counted("45355.{j},1", "Date,x"), "start = 1899-12-30T00:00:00Z"),
     "MATLAB days": (counted("739315.{j},1", "t,x"), 'unit = "datenum"'),
     "LabVIEW seconds": (counted("379238120{i}.25,1", "Time,x"), "start = 1904-01-01T00:00:00Z"),
+    "times before zero": (lines("t,x", "-0.2,1", "-0.1,2", "0,3"), "start = 1970-01-02T00:00:00Z"),
     "centimetres": (counted("{i},1", "t / s,position / cm"), 'unit = "cm" }'),
 }
 
@@ -198,6 +199,16 @@ def test_guesses(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) 
     (tmp_path / "t.csv").write_text(text)
     assert run(["import", str(tmp_path / "t.csv"), "--guess"]) == 0
     assert said in capsys.readouterr().out
+
+
+def test_guesses_leave_out_what_has_another_length(tmp_path: Path, capsys: Any) -> None:
+    rows = ["0;1;;0;7", "1;2;;5;8", "2;3;;;", "3;4;;;"]
+    (tmp_path / "t.csv").write_text(lines("t;x;;u;y", *rows))
+    assert run(["import", str(tmp_path / "t.csv"), "--guess"]) == 0
+    assert "# y: 2 values, 4 times, not mapped" in capsys.readouterr().out
+    (tmp_path / "t.csv").write_text(lines("t;x", "0;a", "1;b", "2;c"))
+    assert run(["import", str(tmp_path / "t.csv"), "--guess"]) == 3
+    assert "column 'x' holds text" in capsys.readouterr().err
 
 
 def test_units_stand_in_many_places(tmp_path: Path) -> None:
