@@ -22,24 +22,23 @@ class SessionColumns(Mapping[str, NDArray[Any]]):
     def __init__(self, session: Session) -> None:
         self._session = session
         self._names: dict[str, tuple[str, str]] = {}
-        self.left_out: list[str] = []
-        for topic in session.info.channels:
-            for field in self._fields(topic):
-                self._names[f"{topic}.{field}"] = (topic, field)
+        self.notes: list[str] = []
+        for topic, row in session.info.channels.items():
+            try:
+                fields = [*self._fields(topic)]
+            except SeamlogError as error:
+                self.notes.append(_told(topic, row.count, error))
+                continue
+            self._names |= {f"{topic}.{field}": (topic, field) for field in fields}
 
     def _fields(self, topic: str) -> Iterator[str]:
-        columns = self._session.columns(topic)
-        for name, column in columns.items():
+        for name, column in self._session.columns(topic).items():
             if column.dtype.kind in "biuf" and column.ndim == 1:
                 yield name
             elif column.dtype == object and len(column) and isinstance(column[0], np.ndarray):
                 longest = max(len(values) for values in column)
                 if column[0].dtype.kind in "biuf" and column[0].ndim == 1 and longest <= _ELEMENTS:
-                    yield from (f"{_picked(name, place)}" for place in range(longest))
-                    continue
-                self.left_out.append(f"{topic}.{name}")
-            else:
-                self.left_out.append(f"{topic}.{name}")
+                    yield from (_picked(name, place) for place in range(longest))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         topic, field = self._names[name]
@@ -71,7 +70,7 @@ def _picked(name: str, place: int) -> str:
 def content_of_session(session: Session) -> Content:
     """All numeric columns of a session's topics."""
     columns = SessionColumns(session)
-    return Content(columns, times=columns.times())
+    return Content(columns, times=columns.times(), notes=columns.notes)
 
 
 def unreadable(session: Session) -> Iterator[str]:
@@ -83,5 +82,9 @@ def unreadable(session: Session) -> Iterator[str]:
         try:
             session.window(first, first + 1).columns(topic)
         except SeamlogError as error:
-            reason = str(error).partition(f"{topic}: ")[2] or str(error)
-            yield f"{topic}: its {row.count} messages were copied but cannot be read: {reason}"
+            yield _told(topic, row.count, error)
+
+
+def _told(topic: str, count: int, error: SeamlogError) -> str:
+    reason = str(error).partition(f"{topic}: ")[2] or str(error)
+    return f"{topic}: its {count} messages were copied but cannot be read: {reason}"

@@ -167,6 +167,20 @@ def test_messages_that_cannot_be_read_are_copied_and_said(
         assert opened.columns("/good")["n"].tolist() == [7] * 5
 
 
+@pytest.mark.parametrize("name", STRANGE)
+def test_a_map_takes_axes_out_of_a_bag_with_topics_that_cannot_be_read(
+    tmp_path: Path, session: Path, name: str, capsys: Any
+) -> None:
+    schema, encoding, data, _ = STRANGE[name]
+    bag, mapping = write_mcap(tmp_path / "x.mcap", schema, encoding, data), tmp_path / "m.toml"
+    assert run(["import", str(bag), "--guess", "-o", str(mapping)]) == 0
+    assert "# /p: its 5 messages were copied but cannot be read" in capsys.readouterr().out
+    mapping.write_text('[channels."/table/encoder".fields]\nposition_m.column = "/good.x"\n')
+    assert run(["import", str(bag), "--map", str(mapping), "-o", str(session)]) == 0
+    with seamlog.open_session(session) as opened:
+        assert opened.columns("/table/encoder")["position_m"].tolist() == [1.5] * 5
+
+
 def test_definitions_are_completed_from_those_of_ros(
     tmp_path: Path, session: Path, capsys: Any
 ) -> None:
