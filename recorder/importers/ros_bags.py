@@ -1,7 +1,8 @@
 """ROS bags: every topic is taken over as it is, with its message definition."""
 
+import struct
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,12 @@ from seamlog.mcap.rows import iter_batches
 from seamlog.mcap.streams import MessageStream
 
 from .content import Report
+from .ros1_walk import Walk
 from .ros_definitions import completed, own_packages, schema_of
 from .ros_files import counts_of, files_of, is_compressed_by_message, plain
 
+_DAMAGED = (struct.error, ValueError, IndexError, KeyError, AssertionError)
+"""What rosbags raises over messages that do not fit their definition, besides its own errors."""
 _HEADER = "builtin_interfaces/Time stamp\nstring frame_id\n"
 
 
@@ -53,38 +57,72 @@ class Ros2Importer:
 
 
 class Ros1Importer:
-    """Reads ROS 1 bags; messages become CDR with ROS 2 definitions."""
+    """Reads ROS 1 bags; messages become CDR with ROS 2 definitions.
+
+    A bag without an index, or with a lost end, is walked record by record.
+    """
 
     def write(self, path: Path, writer: BatchWriter) -> Report:
         """Copy all messages into `writer`; what was lost or had to be decided."""
-        rosbag1 = _rosbags("rosbag1", path)
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+        _rosbags("rosbag1", path)
+        from rosbags.serde import SerdeError
+        from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
         report = Report()
         store = get_typestore(Stores.EMPTY)
         # rosbags drops `seq`, which the header of ROS 1 has, while it converts
         store.register(get_types_from_msg(_HEADER, "std_msgs/msg/Header"))
-        streams = _Streams(writer, report)
-        try:
-            with rosbag1.Reader(path) as reader:
-                for connection in reader.connections:
-                    types = get_types_from_msg(connection.msgdef.data, connection.msgtype)
+        streams, bad, count = _Streams(writer, report), Counter[str](), 0
+        for connection, time, raw in _messages_of_ros1(path, report):
+            name = connection.msgtype
+            try:
+                if name not in store.types:
+                    types = get_types_from_msg(connection.msgdef.data, name)
                     store.register({k: v for k, v in types.items() if k not in store.types})
-                for connection, time, raw in reader.messages():
-                    name = connection.msgtype
-                    payload = bytes(store.ros1_to_cdr(raw, name))
-                    stream = streams.of(connection, lambda name=name: schema_of(name, store))
-                    if stream is not None:
-                        stream.put(time, payload)
-        except (ImportFailed, OSError):
-            raise
-        except Exception as error:
-            raise ImportFailed(
-                f"{path} cannot be read as a ROS 1 bag: {error}; if it was not closed or is cut, "
-                "let ROS write its index anew first: rosbag reindex"
-            ) from error
+                payload = bytes(store.ros1_to_cdr(raw, name))
+            except (*_DAMAGED, SerdeError, TypesysError):
+                bad[connection.topic] += 1
+                continue
+            stream = streams.of(connection, lambda name=name: schema_of(name, store))
+            if stream is not None:
+                stream.put(time, payload)
+                count += 1
+        report.losses += [
+            f"{topic}: {number} messages do not fit their definition and were left out"
+            for topic, number in bad.items()
+        ]
+        if not count and report.losses:
+            raise ImportFailed(f"{path}: no message can be read; {'; '.join(report.losses)}")
         streams.finish()
         return report
+
+
+def _messages_of_ros1(path: Path, report: Report) -> Iterator[tuple[Any, int, bytes]]:
+    from rosbags.rosbag1 import Reader, ReaderError
+
+    reader = Reader(path)
+    try:
+        reader.open()
+    except (ReaderError, *_DAMAGED) as error:
+        yield from _walked(path, report, error)
+        return
+    try:
+        yield from reader.messages()
+    except (ReaderError, *_DAMAGED, OSError, RuntimeError) as error:
+        report.losses.append(f"{path.name}: reading stopped at a fault: {error}")
+    finally:
+        reader.close()
+
+
+def _walked(path: Path, report: Report, reason: Exception) -> Iterator[tuple[Any, int, bytes]]:
+    walk = Walk(path.read_bytes())
+    try:
+        yield from walk.messages()
+    except (ImportFailed, KeyError, UnicodeDecodeError) as error:
+        raise ImportFailed(f"{path} cannot be read as a ROS 1 bag: {error}") from error
+    report.notes.append(f"the bag has no usable index ({reason}); its records were walked")
+    if walk.stopped:
+        report.losses.append(f"{path.name}: {walk.stopped}; what follows could not be read")
 
 
 class _Streams:

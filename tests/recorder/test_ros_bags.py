@@ -203,3 +203,79 @@ def test_a_message_without_fields_is_read(tmp_path: Path, session: Path, capsys:
     assert code == 0
     with seamlog.open_session(session) as opened:
         assert opened.columns("/p")["log_time_ns"].tolist() == list(range(5))
+
+
+ROS1 = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
+
+
+def write_ros1(path: Path, compression: str = "", count: int = 600) -> Path:
+    from rosbags.rosbag1 import Writer
+
+    writer = Writer(path)
+    writer.chunk_threshold = 4000
+    if compression:
+        writer.set_compression(Writer.CompressionFormat[compression])
+    types, name = ROS1.types, "geometry_msgs/msg/PointStamped"
+    with writer:
+        connection = writer.add_connection("/p", name, typestore=ROS1)
+        for place in range(count):
+            stamp = types["builtin_interfaces/msg/Time"](1_700_000_000, place)
+            header = types["std_msgs/msg/Header"](place, stamp, "base")
+            point = types["geometry_msgs/msg/Point"](float(place), 2.0, 3.0)
+            raw = ROS1.serialize_ros1(types[name](header, point), name)
+            writer.write(connection, START_NS + place, raw)
+    return path
+
+
+def read_p(session: Path) -> list[float]:
+    with seamlog.open_session(session) as opened:
+        found: list[float] = opened.columns("/p")["point.x"].tolist()
+    return found
+
+
+@pytest.mark.parametrize("compression", ["", "LZ4", "BZ2"])
+def test_a_ros1_bag_without_an_index_is_walked(
+    tmp_path: Path, session: Path, compression: str, capsys: Any
+) -> None:
+    bag = write_ros1(tmp_path / "x.bag", compression)
+    data = bytearray(bag.read_bytes())
+    at = data.find(b"index_pos=") + 10
+    data[at : at + 8] = bytes(8)  # as a recorder that was killed leaves it
+    bag.write_bytes(data)
+    code, told = imported(bag, session, capsys)
+    assert (code, told["losses"]) == (0, [])
+    assert read_p(session) == list(range(600))
+
+
+@pytest.mark.parametrize("compression", ["", "LZ4"])
+def test_a_cut_ros1_bag_gives_what_is_there(
+    tmp_path: Path, session: Path, compression: str, capsys: Any
+) -> None:
+    bag = write_ros1(tmp_path / "x.bag", compression)
+    bag.write_bytes(bag.read_bytes()[: bag.stat().st_size // 2])
+    code, told = imported(bag, session, capsys)
+    assert code == 1 and "could not be read" in told["losses"][0]
+    found = read_p(session)
+    assert found == list(range(len(found))) and len(found) > 100
+
+
+@pytest.mark.parametrize("data", [b"", b"#ROSBAG V2.0\n" + bytes(99), b"#ROSBAG V1.2\n"])
+def test_what_is_no_ros1_bag_is_refused(
+    tmp_path: Path, session: Path, data: bytes, capsys: Any
+) -> None:
+    (tmp_path / "x.bag").write_bytes(data)
+    code, told = imported(tmp_path / "x.bag", session, capsys)
+    assert code == 3 and "x.bag" in told["message"]
+    assert not session.exists()
+
+
+def test_damaged_ros1_bags_never_crash(tmp_path: Path, capsys: Any) -> None:
+    data = write_ros1(tmp_path / "x.bag", count=50).read_bytes()
+    rng = np.random.default_rng(0)
+    for place in rng.integers(13, len(data), 60).tolist():
+        broken = bytearray(data)
+        broken[place] ^= 0xFF
+        (tmp_path / "y.bag").write_bytes(broken)
+        words = ["import", str(tmp_path / "y.bag"), "-o", str(tmp_path / "y.mcap"), "--force"]
+        assert run(words) in (0, 1, 3), place
+        capsys.readouterr()
