@@ -33,7 +33,7 @@ def _walked_back(values: NDArray[np.float32], cost: np.float32) -> NDArray[np.in
     before = values[:-1]
     same, less, more = before[..., 1:-1], before[..., :-2] - cost, before[..., 2:] - cost
     came = (more > np.maximum(same, less)).astype(np.int8)
-    came -= less > np.maximum(same, more)
+    came -= (less > same) & (less >= more)
     path = np.empty((values.shape[1], len(values)), dtype=np.int64)
     for chain, last in enumerate(np.argmax(values[-1, :, 1:-1], axis=1).tolist()):
         path[chain, -1] = column = last
