@@ -1,5 +1,6 @@
 """From coarse toes to sub-pixel ones, in windows along each toe at the photo's own resolution."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -36,7 +37,7 @@ must lie along a straight line."""
 _WINDOW_PX = 18
 _MODEL_ROWS = 512
 """Rows from which a toe's model is made at most, and from which the averaging along it is."""
-_TRIED_ROWS = 200
+_TRIED_ROWS = 160
 _GOLDEN = (np.sqrt(5) - 1) / 2
 _SENSOR_PX = 0.04
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
@@ -172,8 +173,8 @@ class _Side:
         rows = _tried(len(near), _TRIED_ROWS)
         pick, centre = pick[rows], np.rint(near[rows]).astype(np.int64)
         found: list[Fit] = []
-        for share in _SHARES:
-            signal = averaged_at(self._signal, pick, share * self._longest)
+        sigmas = [share * self._longest for share in _SHARES]
+        for signal in averages_at(self._signal, pick, sigmas):
             seen = profiles_at(signal, centre, model.window)
             if not found:
                 shading = shading_along(seen, centre, model)
@@ -229,13 +230,27 @@ def _mixed(pixels: Signal, direction: Floats) -> Signal:
 
 def averaged_at(values: Signal, rows: Rows, sigma: float) -> Signal:
     """Gaussian averages over rows, at some rows only."""
-    half = int(3 * sigma + 0.5)
+    return averages_at(values, rows, (sigma,))[0]
+
+
+def averages_at(values: Signal, rows: Rows, sigmas: Sequence[float]) -> Signal:
+    """As `averaged_at` for several sigmas, the largest first, shape (sigmas, rows, ...)."""
+    half = int(3 * sigmas[0] + 0.5)
     taps = np.arange(-half, half + 1)
-    kernel = np.exp(-0.5 * (taps / sigma) ** 2).astype(np.float32)
-    kernel /= kernel.sum()
-    edges = [(half, half)] + [(0, 0)] * (values.ndim - 1)
-    around = sliding_window_view(np.pad(values, edges, mode="edge"), len(taps), axis=0)[rows]
-    return np.asarray(around @ kernel)
+    kernels = np.exp(-0.5 * (taps / np.array(sigmas)[:, None]) ** 2)
+    kernels[np.abs(taps) > 3 * np.array(sigmas)[:, None] + 0.5] = 0.0
+    kernels = (kernels / kernels.sum(axis=1, keepdims=True)).astype(np.float32)
+    flat = np.pad(values.reshape(len(values), -1), [(half, half), (0, 0)], mode="edge")
+    around = sliding_window_view(flat, len(taps), axis=0)[_as_slice(rows)].swapaxes(1, 2)
+    found = np.matmul(kernels, around).swapaxes(0, 1)
+    return np.asarray(found.reshape(len(sigmas), len(rows), *values.shape[1:]))
+
+
+def _as_slice(rows: Rows) -> Rows | slice:
+    """Evenly spaced rows as a slice, which copies nothing."""
+    step = int(rows[1] - rows[0]) if len(rows) > 1 else 1
+    even = step > 0 and bool((np.diff(rows) == step).all())
+    return slice(int(rows[0]), int(rows[-1]) + 1, step) if even else rows
 
 
 def columns_of_change(profiles: Signal) -> float:
