@@ -147,11 +147,12 @@ class _Side:
         sigma = np.hypot(places.blur_px / self._row_px, averaged)
         taken = places.column - _slow(places.column, sigma / every)
         again = _slow(taken, sigma / every)
-        more = np.clip(np.std(taken) / max(float(np.std(again)), 1e-6), 1.0, _MOST_SMEARED)
-        wide = (sigma / averaged) ** 2
-        passed = 1 - 2 / np.sqrt(1 + wide / 2) + 1 / np.sqrt(1 + wide)
-        noise = passed * float(np.median(places.u_noise)) ** 2
-        return float(np.sqrt(max(float(np.var(taken)) - noise, 0.0)) * more)
+        wide, noise = (sigma / averaged) ** 2, float(np.median(places.u_noise)) ** 2
+        first = float(np.var(taken)) - noise * _passed(0, wide)
+        second = float(np.var(again)) - noise * _passed(1, wide)
+        if first <= 0 or second <= 0:
+            return 0.0
+        return float(np.sqrt(first * np.clip(first / second, 1.0, _MOST_SMEARED**2)))
 
     def _sharpest(self, signal: Signal) -> Floats:
         """Chain of the steepest rises from plate to bead near the coarse toe."""
@@ -221,6 +222,16 @@ def _slow(values: Floats, sigma: float) -> Floats:
     return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
 
 
+def _passed(smoothings: int, wide: float) -> float:
+    """Part of averaged noise that a smoothing takes after others `wide` times as much in square."""
+    before = smoothings * wide
+    return float(
+        1 / np.sqrt(1 + before)
+        - 2 / np.sqrt(1 + before + wide / 2)
+        + 1 / np.sqrt(1 + before + wide)
+    )
+
+
 def _mixed(pixels: Signal, direction: Floats) -> Signal:
     """One signal from the channels."""
     if pixels.shape[2] == 1:
@@ -230,7 +241,7 @@ def _mixed(pixels: Signal, direction: Floats) -> Signal:
 
 def averaged_at(values: Signal, rows: Rows, sigma: float) -> Signal:
     """Gaussian averages over rows, at some rows only."""
-    return averages_at(values, rows, (sigma,))[0]
+    return np.asarray(averages_at(values, rows, (sigma,))[0])
 
 
 def averages_at(values: Signal, rows: Rows, sigmas: Sequence[float]) -> Signal:
