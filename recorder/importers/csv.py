@@ -58,7 +58,7 @@ def _read(path: Path, layout: Layout) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             return pd.read_csv(
-                io.StringIO(layout.body),
+                io.BytesIO(layout.body.encode()),
                 sep=r"\s+" if layout.separator == " " else layout.separator,
                 decimal=layout.decimal,
                 header=None,

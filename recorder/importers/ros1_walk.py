@@ -18,21 +18,21 @@ _LARGEST_CHUNK = 1 << 30
 class Walk:
     """Messages of a bag in file order; `stopped` says where the rest could not be read."""
 
-    data: bytes
+    data: memoryview
     stopped: str = ""
     _connections: dict[bytes, Any] = field(default_factory=dict)
 
     def messages(self) -> Iterator[tuple[Any, int, bytes]]:
         """Connection (topic, msgtype, msgdef.data), time in ns, and payload of each message."""
-        if not self.data.startswith(_MAGIC):
+        if self.data[: len(_MAGIC)] != _MAGIC:
             raise ImportFailed("it does not begin as a bag of version 2.0")
         try:
-            head, _, _ = _record(memoryview(self.data), len(_MAGIC))
+            head, _, _ = _record(self.data, len(_MAGIC))
         except (struct.error, ValueError) as error:
             raise ImportFailed(f"its first record cannot be read: {error}") from error
         if head.get(b"op") != _BAG:
             raise ImportFailed("its first record is no head of a bag")
-        yield from self._records(memoryview(self.data), len(_MAGIC), 0)
+        yield from self._records(self.data, len(_MAGIC), 0)
 
     def _records(self, data: memoryview, at: int, base: int) -> Iterator[tuple[Any, int, bytes]]:
         while at < len(data):

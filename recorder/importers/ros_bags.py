@@ -3,6 +3,7 @@
 import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,7 @@ def _messages_of_ros1(path: Path, report: Report) -> Iterator[tuple[Any, int, by
 
 
 def _walked(path: Path, report: Report, reason: Exception) -> Iterator[tuple[Any, int, bytes]]:
-    walk = Walk(path.read_bytes())
+    walk = Walk(_mapped(path))
     try:
         yield from walk.messages()
     except (ImportFailed, KeyError, UnicodeDecodeError) as error:
@@ -123,6 +124,13 @@ def _walked(path: Path, report: Report, reason: Exception) -> Iterator[tuple[Any
     report.notes.append(f"the bag has no usable index ({reason}); its records were walked")
     if walk.stopped:
         report.losses.append(f"{path.name}: {walk.stopped}; what follows could not be read")
+
+
+def _mapped(path: Path) -> memoryview:
+    if not path.stat().st_size:
+        return memoryview(b"")
+    with path.open("rb") as file:
+        return memoryview(mmap(file.fileno(), 0, access=ACCESS_READ))
 
 
 class _Streams:
