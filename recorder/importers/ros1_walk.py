@@ -42,7 +42,10 @@ class Walk:
                 self.stopped = self.stopped or f"from byte {base + at} on: {error}"
                 return
             at = end
-            yield from self._content(head, data[start : min(end, len(data))], base + start)
+            try:
+                yield from self._content(head, data[start : min(end, len(data))], base + start)
+            except (struct.error, ValueError, KeyError) as error:
+                self.stopped = self.stopped or f"the record at byte {base + start}: {error}"
             if end > len(data):
                 cut = f"the record at byte {base + start} is cut"
                 self.stopped = self.stopped or cut

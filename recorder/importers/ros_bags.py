@@ -119,7 +119,7 @@ def _walked(path: Path, report: Report, reason: Exception) -> Iterator[tuple[Any
     walk = Walk(_mapped(path))
     try:
         yield from walk.messages()
-    except (ImportFailed, KeyError, UnicodeDecodeError) as error:
+    except ImportFailed as error:
         raise ImportFailed(f"{path} cannot be read as a ROS 1 bag: {error}") from error
     report.notes.append(f"the bag has no usable index ({reason}); its records were walked")
     if walk.stopped:

@@ -1,5 +1,7 @@
 """ULog files of PX4 flight controllers and of what is built on them, through pyulog."""
 
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +33,15 @@ class ULogImporter:
             raise HardwareError(
                 f"{path}: ULog files are read by pyulog: pip install 'seamlog[import]'"
             ) from error
-        try:
-            with path.open("rb") as file:
-                log = ULog(file)
-        except OSError:
-            raise
-        except Exception as error:
-            raise ImportFailed(f"{path} cannot be read as a ULog file: {error}") from error
-        content = Content({}, notes=[], losses=_losses(log))
+        printed = StringIO()
+        with path.open("rb") as file:
+            try:
+                with redirect_stdout(printed):
+                    log = ULog(file)
+            except (Exception, SystemExit) as error:  # pyulog leaves the program over some faults
+                raise ImportFailed(f"{path} cannot be read as a ULog file: {error}") from error
+        content = Content({}, notes=[*dict.fromkeys(printed.getvalue().splitlines())])
+        content.losses = _losses(log)
         start_us = _start_us(log, content.notes)
         columns: dict[str, NDArray[Any]] = {}
         for data in log.data_list:

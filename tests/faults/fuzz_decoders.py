@@ -22,6 +22,7 @@ from seamlog.recorder.importers.mat import MatImporter
 from seamlog.recorder.importers.parquet import ParquetImporter
 from seamlog.recorder.importers.ros_bags import Ros1Importer, Ros2Importer
 from seamlog.recorder.importers.tdms import TdmsImporter
+from seamlog.recorder.importers.ulog import ULogImporter
 from tests.core.protobuf_schemas import everything, joint_states
 
 TEXT = b"int8 a\nstring[] b\nfloat64[2] c\nInner[] d\n===\nMSG: p/Inner\nstring e\nuint16[<=3] f\n"
@@ -84,6 +85,7 @@ def readers(path: Path) -> list[Callable[[bytes], Any]]:
         *(table(item) for item in (CsvImporter, MatImporter, ParquetImporter, TdmsImporter)),
         messages(Ros1Importer, ".bag"),
         messages(Ros2Importer, ".db3"),
+        table(ULogImporter),
     ]
 
 

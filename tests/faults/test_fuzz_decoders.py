@@ -20,6 +20,7 @@ from tests.core.test_protobuf import joints
 from tests.faults.fuzz import edited, fuzz
 from tests.faults.fuzz_decoders import GRAMMARS, TEXT, attempt, readers, seeds
 from tests.faults.telling import Tell
+from tests.recorder.test_ulog_files import write as write_ulog
 
 EDITS = st.lists(
     st.tuples(st.floats(0, 1), st.integers(0, 9), st.binary(max_size=9)), min_size=1, max_size=4
@@ -49,6 +50,7 @@ def valid(tmp_path_factory: pytest.TempPathFactory) -> dict[int, bytes]:
         *files,
         bag1(folder / "x.bag"),
         bag2(folder / "bag"),
+        write_ulog(folder / "x.ulg").read_bytes(),
     ]
     return dict(enumerate(inputs))
 
@@ -73,7 +75,7 @@ def bag2(path: Path) -> bytes:
 
 def test_valid_inputs_are_read(valid: dict[int, bytes], tmp_path: Path) -> None:
     known = readers(tmp_path / "x.bin")
-    assert len(known) == len(valid) == 2 * len(GRAMMARS) + 9
+    assert len(known) == len(valid) == 2 * len(GRAMMARS) + 10
     for number in range(2 * len(GRAMMARS), len(known)):
         known[number](valid[number])
 
