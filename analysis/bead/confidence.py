@@ -12,6 +12,11 @@ def soft_px(width_px: float) -> float:
     return max(2.0, 0.015 * width_px)
 
 
+def _sharp_px(width_px: float) -> float:
+    """Blur of a toe up to which it is one, whatever band lies inside."""
+    return float(np.clip(0.006 * width_px, 1.5, 3.5))
+
+
 @dataclass(frozen=True, slots=True)
 class Evidence:
     """What a width rests on.
@@ -52,7 +57,9 @@ def doubts(evidence: Evidence) -> list[Doubt]:
     """All doubts, the worst first."""
     e = evidence
     inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
-    tinted = max(inside, 0.5) * np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
+    soft = np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
+    less_sharp = np.clip(e.blur_px - _sharp_px(e.width_px), 0, 1)
+    tinted = max(0.5 * soft, inside * less_sharp)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),

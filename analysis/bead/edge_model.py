@@ -27,6 +27,9 @@ from .edge_shapes import (
 )
 
 _BLURS_PX = tuple(float(blur) for blur in np.geomspace(0.6, 5.0, 20))
+_ROW_BLURS_PX = _BLURS_PX[1::2]
+_SINGLE_ROWS = ("step", "line", "ramps", "ramps, line")
+"""Models that a single row can carry."""
 GREY_FLOOR = 0.02
 """Variance in grey levels that any mean profile has: rounding to 8 bit, the model of the blur."""
 EDGE_FLOOR = 0.01
@@ -208,12 +211,18 @@ def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
     return _Candidate(model, blur, score, float(np.median(places)))
 
 
-def typical_blur(profiles: Floats, window: Window, model: str) -> float:
-    """Blur at which a model fits single rows best: a ragged toe's mean is softer than they."""
-    blurs, shifts = _BLURS_PX[::2], shifts_within(2.5, COARSE)
+def typical_blur(profiles: Floats, window: Window) -> float:
+    """Blur that fits single rows best: where a toe is ragged, their mean is softer than they."""
     weighted = level_weighted(profiles, window)
-    bases = subspaces(window, model, blurs, 2.5, COARSE)
-    captured = energy((weighted @ bases).reshape(len(profiles), parameters(model), -1))
-    most = captured.reshape(len(profiles), len(blurs), len(shifts)).max(axis=2)
-    misfit = (weighted**2).sum(axis=1, keepdims=True) - most
-    return blurs[int(np.argmin(np.median(misfit, axis=0)))]
+    whole = (weighted**2).sum(axis=1, keepdims=True)
+    scores = []
+    for model in _SINGLE_ROWS:
+        bases = subspaces(window, model, _ROW_BLURS_PX, 2.5, COARSE)
+        captured = energy((weighted @ bases).reshape(len(profiles), parameters(model), -1))
+        most = captured.reshape(len(profiles), len(_ROW_BLURS_PX), -1).max(axis=2)
+        freedom = max(window.size - parameters(model) - 1, 1.0)
+        misfit = np.median(whole - most, axis=0) / freedom
+        price = _price(window) * (parameters(model) - 2)
+        logs = np.log(np.maximum(misfit, 0) + GREY_FLOOR) + price
+        scores += list(zip(logs.tolist(), _ROW_BLURS_PX, strict=True))
+    return min(scores)[1]

@@ -132,9 +132,9 @@ class _Side:
         """Blur of the toe; that of single rows where their mean is soft, for a toe is ragged."""
         if model.blur <= _SHARP_PX:
             return model.blur
-        rows = _tried(len(near), _MODEL_ROWS)
+        rows = _tried(len(near), _TRIED_ROWS)
         profiles = profiles_at(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
-        return typical_blur(profiles, self._window, model.name)
+        return typical_blur(profiles, self._window)
 
     def _smeared(self, places: EdgePlaces, share: float, every: int) -> float:
         """Px of the toe's own waviness that blur and averaging take away, rms.

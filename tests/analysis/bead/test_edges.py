@@ -95,7 +95,7 @@ def test_a_rise_is_found_beside_a_higher_fall() -> None:
 def test_a_ragged_toe_is_as_sharp_as_its_rows() -> None:
     toe = MIDDLE + np.random.default_rng(4).normal(0, 1.2, ROWS)
     rows = picture(toe)[:, MIDDLE - 18 : MIDDLE + 19]
-    assert typical_blur(rows, WINDOW, "step") == pytest.approx(1.1, rel=0.2)
+    assert typical_blur(rows, WINDOW) == pytest.approx(1.1, rel=0.2)
 
 
 @given(st.lists(st.lists(st.integers(-9, 9), min_size=3, max_size=3), min_size=2, max_size=5))
