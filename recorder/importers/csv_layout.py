@@ -194,15 +194,18 @@ class _Look:
                 f"{path}: lines {same[0] + 1} to {same[-1] + 1} hold rows of the same width as the "
                 f"table from line {table[0] + 1} on; split the file into one table each"
             )
-        header = table[0] - 1
-        named = self.width(header) if top < table[0] or header >= 0 else 0
-        odd = next((at for at in table if self.width(at) > max(named, 1) > 1), None)
-        narrow = next((at for at in table if self.width(at) <= named), None)
+        filled = [at for at in range(table[0]) if any(self.rows[at])]
+        named = self.width(filled[-1]) if filled else 0
+        most = named if named > 1 else min(widths)  # without a header nothing tells which is right
+        odd = next((at for at in table if self.width(at) > most > 1), None)
+        cells = len(self.rows[odd]) if odd is not None else 0
+        shorter = (at for at in table if self.width(at) <= most and len(self.rows[at]) < cells)
+        narrow = next(shorter, None)
         if odd is not None and narrow is not None:
             raise ImportFailed(
                 f"{path}: line {odd + 1} has {self.width(odd)} cells, line {narrow + 1} has "
-                f"{self.width(narrow)}, the header {named}: commas seem to separate thousands or "
-                "decimals as well as cells; export it with another separator, or correct the line"
+                f"{self.width(narrow)}, the line above {named}: commas seem to separate thousands "
+                "or decimals as well as cells; export it with another separator, or correct it"
             )
         if separator == "," and named > 1 and usual in (2 * named - 1, 2 * named):
             raise ImportFailed(

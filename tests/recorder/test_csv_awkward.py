@@ -67,6 +67,7 @@ NUMBERS: dict[str, tuple[str, list[float]]] = {
     "a trigger line above": (
         lines("LECROY,Waveform", "#1,12-Dec-2014 16:02:01,0", "t,x", "-0.1,1", "0,2"), [1, 2]
     ),
+    "last cells empty, no header": (lines("0,1,", "1,2,3", "2,3,", "3,4,"), []),
     "rule below the header": (lines("|t|x|", "|---|---|", "|0|1|", "|1|2|"), [1, 2]),
 }  # fmt: skip
 
@@ -79,7 +80,8 @@ def load(path: Path, text: str, encoding: str = "utf-8") -> Any:
 @pytest.mark.parametrize("name", NUMBERS)
 def test_numbers_are_told(tmp_path: Path, name: str) -> None:
     text, wanted = NUMBERS[name]
-    found = load(tmp_path / "t.csv", text).columns["x"]
+    columns = load(tmp_path / "t.csv", text).columns
+    found = columns["x" if wanted else "column 3"]
     np.testing.assert_array_equal(found[: len(wanted)], wanted)
     assert len(found) >= len(wanted)
 
@@ -152,7 +154,11 @@ REFUSED = {
     "commas everywhere": (counted("{i},5,{j},25"), "separate decimals as well"),
     "thousands without quotes": (
         lines("t,x,y", "0,995,2", "1,998,2", *(f"{i},1,{i:03d},2" for i in range(2, 40))),
-        "line 4 has 4 cells, line 2 has 3, the header 3",
+        "line 4 has 4 cells, line 2 has 3, the line above 3",
+    ),
+    "thousands without quotes, no header": (
+        lines("0,995,2", "1,998,2", *(f"{i},1,{i:03d},2" for i in range(2, 40))),
+        "line 3 has 4 cells, line 1 has 3",
     ),
     "a longer row": (counted("{i},{j}", count=300) + "300,1,234\n", "row 301"),
     "two tables": (counted("{i},{j}") + "\nu,v\n" + counted("{i},{j}", "u,v", 9), "split the file"),
