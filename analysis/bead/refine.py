@@ -39,7 +39,7 @@ _MODEL_ROWS = 512
 """Rows from which a toe's model is made at most, and from which the averaging along it is."""
 _TRIED_ROWS = 160
 _GOLDEN = (np.sqrt(5) - 1) / 2
-_SENSOR_PX = 0.04
+_SENSOR_PX = 0.02
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
 _RASTER_PX = 0.02
 """Standard uncertainty that the raster and the unknown shape of the blur leave at the longest."""

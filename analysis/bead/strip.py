@@ -138,7 +138,7 @@ def _traced(
         half = float(np.median(extent.half)) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
     every, along = _row_step(plane, unit)
-    line = fit_centreline(path, along, max(8.0 * half, 16 * unit))
+    line = fit_centreline(path, along, max(12.0 * half, 16 * unit))
     rough = _carried(strip, extent, middle, line)
     toes = refine_toes(photo, plane, line, rough, unit, every)
     return _Traced(line.every(every), rough.half, toes)
@@ -294,7 +294,7 @@ def _sampled(
     along: float,
     across: float,
 ) -> Strip:
-    line = fit_centreline(path, along, max(8.0 * half, 16 * unit))
+    line = fit_centreline(path, along, max(12.0 * half, 16 * unit))
     return sample_strip(photo, plane, line, 2.4 * half + 8 * across, across, blur=across / unit)
 
 
