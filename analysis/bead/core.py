@@ -13,7 +13,7 @@ from .features import smoothed, strip_features
 from .image import Photo
 from .plane import Plane, Points
 from .refine import averaged_at, columns_of_change
-from .sampling import sample_offsets, sample_strip
+from .sampling import sample_rows, sample_strip
 from .width import Toes
 from .zones import fisher_direction
 
@@ -64,9 +64,9 @@ def softness(
     reach = int(max(6, 0.2 * half_px))
     sides = []
     for side, toe in ((-1, toes[0]), (1, toes[1])):
-        columns = np.arange(-reach, reach + 1)
-        offsets = toe.offset[:, None] - side * unit * columns
-        pixels, valid = sample_offsets(photo, plane, line, offsets)
+        step = -side * unit
+        first = toe.offset - reach * step
+        pixels, valid = sample_rows(photo, plane, line, first, step, 2 * reach + 1)
         smooth = averaged_at(pixels, np.arange(len(pixels)), 2.0)
         inside, outside = (
             smooth[:, part][valid[:, part]] for part in (slice(reach + 1, None), slice(0, reach))

@@ -1,6 +1,7 @@
 """The plane a bead is measured in: millimetres by a calibration, or pixels without one."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,7 @@ class Plane:
         ideal = projected(self.px_from_plane(), points)
         return self.lens.distorted(ideal) if self.lens else ideal
 
-    def through_lens(self, x: Points, y: Points) -> tuple[Points, Points]:
+    def through_lens(self, x: NDArray[Any], y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Photo pixels of what an ideal lens would show at x, y (arrays of one shape)."""
         if self.lens is None:
             return x, y

@@ -18,7 +18,7 @@ from .edge_places import EdgePlaces, locate_edges, random_u, ruler_for, shading_
 from .edge_shapes import Fit, Window
 from .image import Photo
 from .plane import Plane
-from .sampling import sample_offsets
+from .sampling import sample_rows
 from .width import Toes
 from .zones import fisher_direction
 
@@ -94,9 +94,9 @@ class _Side:
         inside = max(3, min(_WINDOW_PX, int(0.8 * half_px)))
         self._window = Window(_WINDOW_PX, inside)
         self._reach = _WINDOW_PX + int(np.ceil(self._search)) + 3
-        columns = np.arange(-self._reach, self._reach + 1)
-        offsets = toe[:, None] - side * unit * columns
-        pixels, self._valid = sample_offsets(photo, plane, line, offsets)
+        step = -side * unit
+        first = toe - self._reach * step
+        pixels, self._valid = sample_rows(photo, plane, line, first, step, 2 * self._reach + 1)
         depth = int(max(4, min(0.25 * half_px, self._reach)))
         direction, self._distance = self._direction(pixels, depth)
         self._signal = _mixed(pixels, direction)

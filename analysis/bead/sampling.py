@@ -47,35 +47,46 @@ def sample_strip(
     """
     count = int(np.ceil(reach / step))
     offsets = np.arange(-count, count + 1, dtype=np.float64) * step
-    opponent, valid = sample_offsets(photo, plane, line, offsets[None], blur)
+    first = np.full(len(line.s), offsets[0])
+    opponent, valid = sample_rows(photo, plane, line, first, step, len(offsets), blur)
     return Strip(line, opponent, valid, offsets, step)
 
 
-def sample_offsets(
-    photo: Photo, plane: Plane, line: Centreline, offsets: NDArray[np.float64], blur: float = 1.0
+def sample_rows(
+    photo: Photo,
+    plane: Plane,
+    line: Centreline,
+    first: NDArray[np.float64],
+    step: float,
+    count: int,
+    blur: float = 1.0,
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Opponent channels at `offsets` (rows or 1, columns) from `line`, and which are in the photo.
+    """Opponent channels at `count` offsets from `line`, and which of them are in the photo.
 
-    Shapes (rows, columns, channels) and (rows, columns); for `blur` see `sample_strip`.
+    Each row begins at its offset `first` and goes on by `step`, which may be negative. Shapes
+    (rows, count, channels) and (rows, count); for `blur` see `sample_strip`.
     """
-    x, y = _maps(plane, line, offsets)
-    valid = (x >= 0) & (x <= photo.width_px - 1) & (y >= 0) & (y <= photo.height_px - 1)
+    x, y = _maps(plane, line, first, step, count)
     left, right = _span(x, photo.width_px)
     top, bottom = _span(y, photo.height_px)
+    valid = _inside(x, photo.width_px) & _inside(y, photo.height_px)
     part = photo.pixels[top:bottom, left:right]
+    x, y = x - np.float32(left), y - np.float32(top)
     factor = 1
     while 2 * factor <= blur and min(part.shape[:2]) >= 2:
         part, factor = _halved(part), 2 * factor
+    if factor > 1:
+        x, y = ((at + np.float32(0.5)) / np.float32(factor) - np.float32(0.5) for at in (x, y))
     if blur / factor > 1.3:
         part = cv2.GaussianBlur(part, (0, 0), 0.4 * blur / factor)
-    sampled = cv2.remap(
-        part,
-        ((x - left + 0.5) / factor - 0.5).astype(np.float32),
-        ((y - top + 0.5) / factor - 0.5).astype(np.float32),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
+    sampled = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return opponent(sampled), valid
+
+
+def _inside(at: Floats, size: int) -> NDArray[np.bool_]:
+    if at.min() >= 0 and at.max() <= size - 1:
+        return np.ones(at.shape, dtype=bool)
+    return np.asarray((at >= 0) & (at <= size - 1))
 
 
 def _halved(pixels: NDArray[Any]) -> NDArray[Any]:
@@ -85,18 +96,22 @@ def _halved(pixels: NDArray[Any]) -> NDArray[Any]:
     return cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA)
 
 
-def _span(values: NDArray[np.float64], size: int) -> tuple[int, int]:
+def _span(values: Floats, size: int) -> tuple[int, int]:
     low = int(np.clip(np.floor(values.min()) - 3, 0, size - 4))
     return low, int(np.clip(np.ceil(values.max()) + 4, low + 4, size))
 
 
 def _maps(
-    plane: Plane, line: Centreline, offsets: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Photo coordinates of all samples: numerators and denominator are linear in the offset."""
+    plane: Plane, line: Centreline, first: NDArray[np.float64], step: float, count: int
+) -> tuple[Floats, Floats]:
+    """Photo coordinates of all samples: numerators and denominator are linear along a row."""
     matrix = plane.px_from_plane()
-    base = (line.points @ matrix[:, :2].T + matrix[:, 2]).astype(np.float32)
-    slope = (line.normals @ matrix[:, :2].T).astype(np.float32)
-    across = offsets.astype(np.float32)
-    x, y, w = (base[:, k, None] + slope[:, k, None] * across for k in range(3))
-    return plane.through_lens(x / w, y / w)
+    start = line.points + first[:, None] * line.normals
+    base = start @ matrix[:, :2].T + matrix[:, 2]
+    slope = step * line.normals @ matrix[:, :2].T
+    along = np.vstack([np.ones(count), np.arange(count)]).astype(np.float32)
+    x, y, w = (
+        np.column_stack([base[:, k], slope[:, k]]).astype(np.float32) @ along for k in range(3)
+    )
+    x, y = plane.through_lens(x / w, y / w)
+    return np.asarray(x, dtype=np.float32), np.asarray(y, dtype=np.float32)
