@@ -23,11 +23,16 @@ def picture_payload(
     return image_head(stamp_ns, frame_id, image_format, len(body)), body
 
 
-def picture_encoder(channel_id: int) -> Encode:
-    """A function from a raw record of the ring to a Message record of channel `channel_id`."""
+def load_encoder() -> None:
+    """Load OpenCV, which takes tenths of a second, while nothing waits to be written."""
     import cv2
 
     cv2.setNumThreads(1)
+
+
+def picture_encoder(channel_id: int) -> Encode:
+    """A function from a raw record of the ring to a Message record of channel `channel_id`."""
+    load_encoder()
     return partial(_encode, channel_id)
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from .engine import CLOSED, Engine
 from .folder import read_recording
+from .pictures import load_encoder
 
 _PASS_MS = 10
 """Pause between two looks at the rings."""
@@ -32,6 +33,7 @@ def main(arguments: list[str]) -> None:
     partial, pipe, loop = (int(text) for text in arguments[1:])
     os.set_blocking(sys.stdout.fileno(), False)
     engine = Engine(read_recording(folder), folder, partial, _say)
+    load_encoder()
     _say({"ready": "yes"})
     ending = _record(engine, pipe, loop)
     document = engine.finish(ending)

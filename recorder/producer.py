@@ -46,9 +46,9 @@ class Producer(ABC):
     def channel(self, topic: str, metadata: Mapping[str, str] | None = None) -> Channel:
         """The channel of `topic` for this thread, made when first asked for.
 
-        Making it allocates its ring (milliseconds): ask before the loop begins. `UsageError` for
-        an unknown topic, a closed recorder or other metadata than before; `SpaceMissing` if
-        there is too little shared memory.
+        Making it allocates its ring, milliseconds, for pictures tenths of a second: ask before
+        the loop begins. `UsageError` for an unknown topic, a closed recorder or other metadata
+        than before; `SpaceMissing` if there is too little shared memory.
         """
         key = (topic, get_ident())
         found = self._channels.get(key)

@@ -4,6 +4,8 @@ import os
 import random
 import shutil
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +18,7 @@ from seamlog.recorder.recovery import recover
 from tests.faults.accounts import ring_stamps, unfinished_stamps
 from tests.faults.telling import Tell
 from tests.recorder.live_loop import TOPICS, LiveLoop
-from tests.recorder.sessions import assert_all_there, read_metadata
+from tests.recorder.sessions import assert_all_there, final_accounts, read_metadata
 
 RATES_HZ = (1.0, 30.0, 1000.0)
 LONG = 67
@@ -90,6 +92,26 @@ def test_the_command_takes_name_and_rings(tmp_path: Path) -> None:
     assert run(["recover", str(loop.partial)]) == 2
     # With its rings gone, nothing tells any more how much there was.
     assert run(["recover", str(loop.partial), "--force"]) == 1
+
+
+def test_a_message_published_but_not_counted_yet_is_accounted_for(tmp_path: Path) -> None:
+    script = """
+import os, sys
+from seamlog.recorder import Recorder
+from seamlog.recorder.ring import ACCEPTED
+recorder = Recorder(sys.argv[1])
+events = recorder.channel("/events")
+for number in range(3):
+    assert events.put(number, 7, "x")
+events.gate.ring.words[ACCEPTED] = 2
+os.kill(recorder.recorder_pid, 9)
+os.kill(os.getpid(), 9)
+"""
+    session = tmp_path / "weld.mcap"
+    subprocess.run([sys.executable, "-c", script, str(session)], check=False, timeout=60)
+    assert recover(session).is_complete
+    row = final_accounts(session)["/events"]
+    assert (row.accepted, row.written, row.lost) == (3, 3, 0)
 
 
 @pytest.mark.soak
