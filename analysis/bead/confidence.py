@@ -36,6 +36,7 @@ class Evidence:
     flagged: float
     rival: float
     inner: float
+    flank: float
     nested: bool
     sharper: float
     step_grey: float
@@ -59,7 +60,8 @@ def doubts(evidence: Evidence) -> list[Doubt]:
     inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
     soft = np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
     less_sharp = np.clip(e.blur_px - _sharp_px(e.width_px), 0, 1)
-    tinted = max(0.5 * soft, inside * less_sharp)
+    film = np.clip((e.inner - 0.6) / 0.15, 0, 1) * np.clip((1.8 - e.flank) / 0.4, 0, 1)
+    tinted = max(0.5 * soft, inside * less_sharp, film)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),
@@ -73,7 +75,12 @@ def doubts(evidence: Evidence) -> list[Doubt]:
             0.45 if e.nested else 1.0,
             "it lies inside a broader band that is as evident: a heat tint?",
         ),
-        (1 - 0.75 * tinted, "its edges are soft and a narrower band lies inside: a heat tint?"),
+        (
+            1 - 0.75 * tinted,
+            "a narrower band lies inside, and its edges are soft: a heat tint?"
+            if film < tinted
+            else "a narrower band lies inside, and the surface is as on the plate: a heat tint?",
+        ),
     ]
     judged = [Doubt(float(np.clip(value, 0, 1)), sentence) for value, sentence in found]
     return sorted(judged, key=lambda doubt: doubt.confidence)

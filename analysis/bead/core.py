@@ -1,9 +1,11 @@
-"""Inside a band: what is sharper there than the band's own toes.
+"""Inside a band: what tells a bead from a heat tint around one.
 
 Something sharp inside shows that the photo is in focus, so toes that are soft in it are soft in
-truth: the fading end of a heat tint rather than the toes of a bead.
+truth: the fading end of a heat tint rather than the toes of a bead. And a tint is a film that
+leaves the plate's surface as it was, where weld metal is mostly rougher.
 """
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,12 @@ _MIDDLE = 0.3
 """Heat spreads alike to both sides: a bead lies this near (half widths) to its tint's middle."""
 _ALONG = 3
 """Rows per section."""
+_FLANK = np.linspace(0.15, 0.45, 7)
+"""Half widths from a toe at which the surface on both its sides is looked at."""
+_REACH = 0.018
+"""Detail finer than this part of the width is texture."""
+_ROUNDING = 0.5
+"""Grey levels of detail that every surface has."""
 
 
 def band_inside(
@@ -74,3 +82,26 @@ def softness(
         direction = fisher_direction(inside, outside)[0].astype(np.float32)
         sides.append(columns_of_change(smooth @ direction))
     return sides[0], sides[1]
+
+
+def flank_texture(
+    photo: Photo, plane: Plane, line: Centreline, toes: tuple[Toes, Toes], unit: float
+) -> float:
+    """How many times more textured the surface is inside a toe than beyond it.
+
+    Of both toes the greater; 0 for a toe beyond which no plate is in the photo.
+    """
+    width = float(np.median(toes[1].offset - toes[0].offset))
+    grey = np.ascontiguousarray(photo.opponent()[..., 0])
+    reach_px = max(1.5, _REACH * width / unit)
+    detail = np.abs(grey - cv2.GaussianBlur(grey, (0, 0), reach_px))
+
+    def typical(toe: Toes, outward: int) -> float:
+        places = [line.shifted(toe.offset + outward * away) for away in _FLANK * width / 2]
+        x, y = np.rint(plane.to_px(np.concatenate(places))).astype(np.int64).T
+        seen = (x >= 0) & (y >= 0) & (x < photo.width_px) & (y < photo.height_px)
+        return float(np.median(detail[y[seen], x[seen]])) + _ROUNDING if seen.any() else np.inf
+
+    return max(
+        typical(toe, -side) / typical(toe, side) for side, toe in zip((-1, 1), toes, strict=True)
+    )

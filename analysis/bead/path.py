@@ -15,6 +15,8 @@ from .plane import Points
 _LONGEST_PX = 288
 _NESTED = 0.7
 """Relative evidence from which on a band inside the found one may be the bead itself."""
+_ALIKE = 0.9
+"""Relative evidence from which on a band beside the found one may be the bead instead."""
 _ALONG = 2
 """Reduced px per section."""
 
@@ -25,7 +27,7 @@ class CoarsePath:
 
     `evidence` is 0 to 1 per point. `rival` is the evidence of the best other band beside it,
     relative to this one's: near 1 means that two beads (or a bead and its like) are in view;
-    `inner` the same for a narrower band inside it.
+    `inner` the same for a narrower band inside it; `nested`: it lies inside a more evident one.
     """
 
     centre_px: Points
@@ -33,13 +35,14 @@ class CoarsePath:
     evidence: NDArray[np.float64]
     rival: float
     inner: float
+    nested: bool
 
 
 def find_paths(photo: Photo) -> list[CoarsePath]:
-    """The most evident bead-like band in the photo, then the narrower one inside it, if any.
+    """The most evident bead-like band in the photo, then others that may be the bead instead.
 
-    A heat tint is the most evident band of some photos, the bead lies inside. `EvidenceError`
-    without any band.
+    A heat tint is the most evident band of some photos, the bead lies inside; and a shadow along
+    a toe may look as much like a bead as the bead beside it. `EvidenceError` without any band.
     """
     features, factor = reduced_features(photo, _LONGEST_PX)
     searches = [_search(features, vertical) for vertical in (False, True)]
@@ -56,12 +59,16 @@ def find_paths(photo: Photo) -> list[CoarsePath]:
         )
     search = searches[vertical]
     inside = _inside(search, band)
-    rival, inner = _relative(_beside(search, band), band), _relative(inside, band)
-    outer = _in_photo(band, vertical, factor, rival, inner)
-    if inside is None or inner < _NESTED:
-        return [outer]
-    deeper = _relative(_inside(search, inside), inside)
-    return [outer, _in_photo(inside, vertical, factor, rival, deeper)]
+    beside = _beside(search, band)
+    rival, inner = _relative(beside, band), _relative(inside, band)
+    found = [_in_photo(band, vertical, factor, rival, inner)]
+    if inside is not None and inner >= _NESTED:
+        deeper = _relative(_inside(search, inside), inside)
+        found.append(_in_photo(inside, vertical, factor, rival, deeper, nested=True))
+    if beside is not None and rival >= _ALIKE:
+        deeper = _relative(_inside(search, beside), beside)
+        found.append(_in_photo(beside, vertical, factor, rival, deeper))
+    return found
 
 
 def _search(features: Features, vertical: bool) -> BandSearch:
@@ -96,9 +103,11 @@ def _inside(search: BandSearch, band: Band) -> Band | None:
     return search.best(allowed, max(4.0, 0.65 * float(np.median(band.right - band.left))))
 
 
-def _in_photo(band: Band, vertical: bool, factor: float, rival: float, inner: float) -> CoarsePath:
+def _in_photo(
+    band: Band, vertical: bool, factor: float, rival: float, inner: float, nested: bool = False
+) -> CoarsePath:
     along = (np.arange(band.first, band.last + 1) * _ALONG + _ALONG // 2 + 0.5) * factor - 0.5
     across = (band.left + band.right) / 2 * factor - 0.5
     pair = (across, along) if vertical else (along, across)
     half = (band.right - band.left) / 2 * factor
-    return CoarsePath(np.column_stack(pair), half, band.evidence, rival, inner)
+    return CoarsePath(np.column_stack(pair), half, band.evidence, rival, inner, nested)

@@ -10,7 +10,7 @@ from seamlog.errors import EvidenceError, ImageError
 
 from .band import BandSearch
 from .confidence import soft_px
-from .core import band_inside, softness
+from .core import band_inside, flank_texture, softness
 from .curve import Centreline, arc_length, fit_centreline
 from .features import smoothed, stack_texture, strip_features
 from .image import Photo
@@ -123,6 +123,9 @@ def _measure(
     unit = plane.unit_per_px(plane.to_px(found.points))
     traced = _traced(photo, plane, found.points, found.half, unit, tracing)
     band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit, tracing))
+    if band.inner:
+        flank = flank_texture(photo, plane, traced.line, traced.toes, unit)
+        band = replace(band, flank=flank)
     return assemble(photo, plane, traced.line, traced.toes, unit, band, start)
 
 
@@ -206,9 +209,10 @@ def _row_step(plane: Plane, unit: float) -> tuple[int, float]:
 
 def _found_paths(photo: Photo, plane: Plane) -> list[_Path]:
     paths = []
-    for order, coarse in enumerate(find_paths(photo)):
+    for coarse in find_paths(photo):
         half = float(np.median(coarse.half_width_px)) * plane.unit_per_px(coarse.centre_px)
-        band = BandEvidence(float(coarse.evidence.mean()), coarse.rival, coarse.inner, order > 0)
+        evidence = float(coarse.evidence.mean())
+        band = BandEvidence(evidence, coarse.rival, coarse.inner, coarse.nested)
         paths.append(_Path(plane.to_plane(coarse.centre_px), half, band))
     return paths
 

@@ -86,9 +86,13 @@ def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> 
 def _plate(
     columns: int, edge: Floats, side: int, half: float, beyond: float, valid: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """The plate beside one toe. Nearest to it slag and spatter may belong to either."""
-    for reach in (_BESIDE * half + 4, 0.3 * half):
-        first = 1 + beyond * half
+    """The plate beside one toe.
+
+    Nearest to it slag and spatter may belong to either, so that part counts only where the photo
+    holds no other plate.
+    """
+    reach = _BESIDE * half + 4
+    for first in (1 + beyond * half, 1.0):
         bounds = (edge + first, edge + reach) if side > 0 else (edge - reach, edge - first)
         mask = zone(columns, *bounds, valid)
         if mask.sum() >= _ENOUGH:

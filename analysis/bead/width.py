@@ -31,6 +31,7 @@ class BandEvidence:
     inner: float
     nested: bool
     sharper: float = 0.0
+    flank: float = np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +200,7 @@ def _evidence(
         flagged=float(flagged.mean()),
         rival=band.rival,
         inner=band.inner,
+        flank=band.flank,
         nested=band.nested,
         sharper=band.sharper,
         step_grey=min(float(np.median(np.abs(toe.bare))) for toe in toes),

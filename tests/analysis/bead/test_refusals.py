@@ -128,6 +128,32 @@ def test_a_heat_tint_is_never_trusted_as_the_bead(scene: Scene) -> None:
         assert any("heat tint" in warning for warning in result.warnings)
 
 
+def film(rng: np.random.Generator, rough: float) -> NDArray[np.uint8]:
+    """A dark stripe in a sharp band on a brushed plate; `rough` is the band's own detail."""
+    picture = 110 + brushed(rng, (400, 640), 4)
+    picture[120:280] -= 45
+    picture[120:280] += rough * rng.standard_normal((160, 640))
+    ripple = 12 * np.sin(np.arange(640) / 3)
+    picture[185:215] = 45 + ripple + 12 * rng.standard_normal((30, 640))
+    soft = cv2.GaussianBlur(picture, (0, 0), 1.0) + rng.standard_normal(picture.shape)
+    return np.clip(np.rint(soft), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_band_as_smooth_as_the_plate_is_doubted_as_a_film(seed: int) -> None:
+    photo = make_photo(film(np.random.default_rng(seed), rough=0), "film.png")
+    result = measure_strip(photo, plane_of(photo, None))
+    assert not result.trusted
+    assert any("surface is as on the plate" in warning for warning in result.warnings)
+
+
+def test_a_rough_band_is_a_bead_whatever_lies_on_it() -> None:
+    photo = make_photo(film(np.random.default_rng(0), rough=25), "rough.png")
+    result = measure_strip(photo, plane_of(photo, None))
+    assert result.trusted
+    assert np.median(result.width) == pytest.approx(160, abs=1)
+
+
 def test_a_path_outside_the_photo_is_refused() -> None:
     bead = render(CASES["clean"], 0)
     photo = make_photo(bead.pixels, "clean.png")

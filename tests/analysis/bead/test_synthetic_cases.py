@@ -53,6 +53,11 @@ def test_width_with_the_path_found_in_the_photo(measure_case: MeasureCase, name:
     assert measured.result.trusted
 
 
+def test_a_dark_band_beside_the_bead_is_not_taken_for_it(measure_case: MeasureCase) -> None:
+    measured = measure_case("haz + texture", 5, False)
+    assert np.median(np.abs(measured.error_px)) <= RMS_PX["haz + texture"]
+
+
 @pytest.mark.parametrize("name", ["snr 20", "snr 5", "blur 3"])
 def test_uncertainty_covers_the_error(measure_case: MeasureCase, name: str) -> None:
     measured = measure_case(name, 3, True)
