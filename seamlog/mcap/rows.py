@@ -141,7 +141,8 @@ def iter_batches(chunks: Iterable[Chunk], channel_id: int) -> Iterator[Batch]:
     """Batches of a channel's messages in file order."""
     waiting: list[Batch] = []
     for batch in _batches(chunks, channel_id):
-        if 2 * int(batch.lengths.sum()) > len(batch.data):
+        size = len(batch.data)
+        if size < _MERGE_BYTES // 2 and 2 * int(batch.lengths.sum()) > size:
             waiting.append(batch)
             if sum(len(part.data) for part in waiting) < _MERGE_BYTES:
                 continue
