@@ -14,8 +14,9 @@ from .content import Content
 
 _TIME = "timestamp"
 _UTC = "time_utc_usec"
-_PLAUSIBLE_UTC_US = 1_000_000_000_000_000
-"""2001; receivers without a fix tell 0 or some weeks after 1980."""
+_PLAUSIBLE_UTC_US = (1_000_000_000_000_000, 4_000_000_000_000_000)
+"""2001 to 2096; receivers without a fix tell 0 or some weeks after 1980."""
+_LONGEST_US = 1_000_000_000_000_000
 
 
 class ULogImporter:
@@ -69,22 +70,26 @@ def _losses(log: Any) -> list[str]:
 def _start_us(log: Any, notes: list[str]) -> int:
     """Time of the boot, us since 1970; 0 where nothing in the log tells."""
     for data in log.data_list:
-        utc = data.data.get(_UTC)
-        if utc is None:
+        utc, stamps = data.data.get(_UTC), data.data.get(_TIME)
+        if utc is None or stamps is None:
             continue
-        known = np.flatnonzero(utc > _PLAUSIBLE_UTC_US)
+        first, last = _PLAUSIBLE_UTC_US
+        known = np.flatnonzero((utc > first) & (utc < last) & (stamps < _LONGEST_US))
         if len(known):
             notes.append(f"times are tied to 1970 by {data.name}")
-            return int(utc[known[0]]) - int(data.data[_TIME][known[0]])
+            return int(utc[known[0]]) - int(stamps[known[0]])
     notes.append("no receiver tells the date: times count from the boot of the controller")
     return 0
 
 
 def _add(data: Any, start_us: int, columns: dict[str, NDArray[Any]], content: Content) -> None:
     topic = data.name + (f"_{data.multi_id}" if data.multi_id else "")
-    stamps = data.data[_TIME]
+    stamps = data.data.get(_TIME, np.empty(0))
     if not len(stamps):
-        content.notes.append(f"topic {topic} has no messages")
+        content.notes.append(f"topic {topic} has no messages with times")
+        return
+    if stamps.dtype.kind != "u" or stamps.max() > _LONGEST_US:
+        content.losses.append(f"topic {topic} has damaged times and was left out")
         return
     time = f"{topic}/time"
     columns[time] = (stamps.astype(np.int64) + start_us) * 1000

@@ -18,7 +18,6 @@ FORMATS = (
     "actuator:uint64_t timestamp;float[2] control;int64_t count;uint8_t mode;uint8_t[7] _padding0;",
     "sensor_gps:uint64_t timestamp;uint64_t time_utc_usec;",
 )
-"""Values of one instance: 2**53 + 1 does not fit float64."""
 
 
 def message(kind: str, content: bytes) -> bytes:
@@ -81,6 +80,13 @@ def test_a_cut_file_gives_what_is_there(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-5])
     assert len(load(path).columns["actuator/count"]) == 10
     assert len(load(path).columns["actuator_1/count"]) == 9
+
+
+def test_topics_with_damaged_times_are_left_out(tmp_path: Path) -> None:
+    wild = message("D", struct.pack("<HQffqB", 0, 2**63, 0, 0, 0, 0))
+    content = load(write(tmp_path / "x.ulg", more=wild))
+    assert content.losses == ["topic actuator has damaged times and was left out"]
+    assert "actuator_1/count" in content.columns and "actuator/count" not in content.columns
 
 
 @pytest.mark.parametrize("data", [b"", b"ULog", b"no log at all" * 9])
