@@ -4,7 +4,8 @@ As in `dataclasses`, one text is filled in per topic: packing by named parameter
 and unpacking a tuple, a fifth of the whole call. Only names of the channel table enter the text.
 
 `number`, the count of accepted messages, is the whole state of the ring: no exception and no
-interrupt between two instructions can leave it inconsistent.
+interrupt between two instructions can leave it inconsistent. A handler of a signal may put too: it
+runs behind a call only, so that `number` tells whether the slot just packed was taken meanwhile.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,19 +30,26 @@ def make(pack_into, data, words, slots, stride, now, anchor, owner, gate):
         nonlocal number, gaps, limit
         if get_ident() != owner:
             return gate.refuse_foreign()
-        if rest or number >= limit:
+        place = number
+        try:
+            log_time = now() + anchor
+        except Exception as error:
+            return gate.refuse_values((stamp_ns, {names}), error)
+        if rest or number >= limit or number != place:
             if rest:
                 return gate.refuse_values((stamp_ns, {names}, *rest), "too many values")
             limit = gate.new_limit(number)
             if not gate.is_open:
                 limit = -1
                 return gate.refuse_closed()
+            if number != place:
+                return put(stamp_ns, {names})
             if number >= limit:
                 gaps += 1
                 return gate.drop(number + gaps - 1)
         try:
             pack_into(
-                data, number % slots * stride, number + gaps, now() + anchor, stamp_ns,
+                data, place % slots * stride, place + gaps, log_time, stamp_ns,
                 {cdr_header}, stamp_ns, {packed}
             )
         except Exception as error:
@@ -49,22 +57,33 @@ def make(pack_into, data, words, slots, stride, now, anchor, owner, gate):
                 gaps -= {sequences}
                 return put(stamp_ns, {names})
             return gate.refuse_values((stamp_ns, {names}), error)
-        number += 1
+        if number != place:
+            return put(stamp_ns, {names})
+        number = place + 1
         words[{head}] = number
         return True
 
     def put_named(stamp_ns, fields):
         nonlocal number
-        if number >= limit or len(fields) != {count} or get_ident() != owner:
+        if len(fields) != {count} or get_ident() != owner:
+            return put(stamp_ns, **fields)
+        place = number
+        try:
+            log_time = now() + anchor
+        except Exception:
+            return put(stamp_ns, **fields)
+        if number >= limit or number != place:
             return put(stamp_ns, **fields)
         try:
             pack_into(
-                data, number % slots * stride, number + gaps, now() + anchor, stamp_ns,
+                data, place % slots * stride, place + gaps, log_time, stamp_ns,
                 {cdr_header}, stamp_ns, {packed_by_name}
             )
         except Exception:
             return put(stamp_ns, **fields)
-        number += 1
+        if number != place:
+            return put(stamp_ns, **fields)
+        number = place + 1
         words[{head}] = number
         return True
 

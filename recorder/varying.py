@@ -49,6 +49,7 @@ class VaryingWriter:
         "_encode",
         "_gaps",
         "_gate",
+        "_is_busy",
         "_known",
         "_limit",
         "_now",
@@ -74,13 +75,31 @@ class VaryingWriter:
         self._known = (0, 0)
         """`head` and the count of messages up to there."""
         self._gaps = 0
+        self._is_busy = False
         self._picture: tuple[tuple[int, ...], tuple[int, int, int]] = ((), (0, 0, 0))
         """Shape of the last picture, and its rows, columns, samples per pixel."""
 
     def put(self, stamp_ns: int, *values: Any) -> bool:
         """Log one message, values in the table's order."""
+        return self._alone(self._put, stamp_ns, values)
+
+    def put_frame(self, stamp_ns: int, image: Any) -> bool:
+        """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""
+        return self._alone(self._put_frame, stamp_ns, image)
+
+    def _alone(self, act: Callable[[int, Any], bool], stamp_ns: int, values: Any) -> bool:
+        """Do `act` in the owner's thread, but not in a signal's handler that interrupts another."""
         if get_ident() != self._owner:
             return self._gate.refuse_foreign()
+        if self._is_busy:
+            return self._gate.refuse("put by a signal's handler while it interrupts a put here")
+        self._is_busy = True
+        try:
+            return act(stamp_ns, values)
+        finally:
+            self._is_busy = False
+
+    def _put(self, stamp_ns: int, values: tuple[Any, ...]) -> bool:
         try:
             time_ns = self._time_ns(stamp_ns)
             start, rest = self._encode(stamp_ns, *values)
@@ -101,10 +120,7 @@ class VaryingWriter:
         self._data[body : at + size] = rest
         return self._publish(end)
 
-    def put_frame(self, stamp_ns: int, image: Any) -> bool:
-        """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""
-        if get_ident() != self._owner:
-            return self._gate.refuse_foreign()
+    def _put_frame(self, stamp_ns: int, image: Any) -> bool:
         try:
             time_ns = self._time_ns(stamp_ns)
             pixels = memoryview(image)

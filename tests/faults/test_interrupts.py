@@ -76,6 +76,73 @@ def test_interrupts_inside_the_calls(tmp_path: Path, seed: int) -> None:
     assert [m.values[0] for m in messages["/table/encoder"]] == [float(s) for s in stamps]
 
 
+HANDLED = """
+import random, signal, sys, time
+import numpy as np
+from seamlog.recorder import Recorder
+
+random.seed(1)
+image = np.zeros((48, 64), np.uint8)
+with Recorder(sys.argv[1]) as recorder:
+    put, named = recorder.channel("/table/encoder").put, recorder.log
+    taken = {topic: [] for topic in ("/table/encoder", "/events", "/camera/image")}
+    for topic in taken:
+        recorder.channel(topic)
+    number = 0
+
+    def act():
+        global number
+        number += 1
+        mine = number
+        if put(mine, mine, 0.0):
+            taken["/table/encoder"].append(mine)
+        number += 1
+        mine = number
+        if named("/table/encoder", mine, position_m=mine, velocity_m_s=0.0):
+            taken["/table/encoder"].append(mine)
+        if named("/events", mine, kind=7, detail="x"):
+            taken["/events"].append(mine)
+        if mine % 50 == 0 and recorder.log_frame("/camera/image", image, mine):
+            taken["/camera/image"].append(mine)
+
+    handled = 0
+
+    def handle(*_):
+        global handled
+        handled += 1
+        act()
+
+    signal.signal(signal.SIGALRM, handle)
+    signal.setitimer(signal.ITIMER_REAL, 50e-6, 150e-6)
+    end = time.monotonic() + 0.7
+    while time.monotonic() < end:
+        act()
+    signal.setitimer(signal.ITIMER_REAL, 0)
+print(handled)
+for topic, stamps in taken.items():
+    print(topic, *stamps)
+"""
+
+
+def test_a_handler_that_logs_too_takes_nothing_from_what_it_interrupts(tmp_path: Path) -> None:
+    path = tmp_path / "weld.mcap"
+    command = [sys.executable, "-c", HANDLED, str(path)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=60)
+    handled, *rows = done.stdout.splitlines()
+    assert int(handled) > 100
+    messages, accounts = read_session(path), final_accounts(path)
+    for topic, *stamps in (row.split() for row in rows):
+        mine = [m for m in messages[topic] if b"put by" not in m.data and b"full" not in m.data]
+        assert sorted(m.publish_time_ns for m in mine) == sorted(map(int, stamps))
+        assert [m.sequence for m in mine] == sorted({m.sequence for m in mine})
+        assert [m.log_time_ns for m in mine] == sorted(m.log_time_ns for m in mine)
+        row = accounts[topic]
+        assert row.offered == row.accepted + row.dropped + row.refused
+        assert (row.accepted, row.lost) == (len(mine), 0)
+    encoder = messages["/table/encoder"]
+    assert [m.values[0] for m in encoder] == [float(m.publish_time_ns) for m in encoder]
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_ctrl_c_while_recording(tmp_path: Path, seed: int) -> None:
     path = tmp_path / "weld.mcap"
