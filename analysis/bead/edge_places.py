@@ -44,10 +44,11 @@ class EdgePlaces:
     """Per row: column of the edge, its random standard uncertainty, that of the model, the step.
 
     `bare` is the step without the shading beside it, `model` says what that is, `blur_px` how
-    blurred the edge is.
+    blurred the edge is, `within` whether the edge was within reach of where it was looked for.
     """
 
     column: Floats
+    within: NDArray[np.bool_]
     u_noise: Floats
     u_model: Floats
     height: Floats
@@ -65,6 +66,7 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     shift = found.shift - _astray(plain, found.shift, model)
     return EdgePlaces(
         column=centre + shift,
+        within=_slow(np.abs(found.shift) > _REACH - 0.1, 2.0) < 0.6,
         u_noise=random_u(found, model.window),
         u_model=np.full(len(near), model.u),
         height=_height(seen, shift, model.window, model.blur),
@@ -159,8 +161,8 @@ def random_u(found: Fit, window: Window) -> Floats:
     return np.asarray(np.sqrt(np.exp(_slow(np.log(found.variance), 3.0)) * noise))
 
 
-def _slow(values: Floats, sigma: float) -> Floats:
-    return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
+def _slow(values: Floats | NDArray[np.bool_], sigma: float) -> Floats:
+    return np.asarray(gaussian_filter1d(values.astype(np.float64), sigma, mode="nearest"))
 
 
 def _height(profiles: Floats, shift: Floats, window: Window, blur: float) -> Floats:

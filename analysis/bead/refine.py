@@ -35,6 +35,8 @@ _CALM = 1.5
 """Windows follow the coarse toe averaged over this many longest averagings: what they average
 must lie along a straight line."""
 _WINDOW_PX = 18
+_SEARCHED = 0.08
+"""Half widths around the coarse toe in which the sharpest edge is looked for."""
 _MODEL_ROWS = 512
 """Rows from which a toe's model is made at most, and from which the averaging along it is."""
 _TRIED_ROWS = 160
@@ -64,6 +66,11 @@ class Rough:
         return float(np.median(self.right - self.left)) / 2
 
 
+def longest_px(half_px: float) -> float:
+    """The longest averaging along a toe that is tried (Gaussian sigma)."""
+    return max(_ALONG_PX, 2 * _ALONG_WIDTHS * half_px)
+
+
 def refine_toes(
     photo: Photo, plane: Plane, line: Centreline, rough: Rough, unit: float, every: int
 ) -> tuple[Toes, Toes]:
@@ -86,11 +93,11 @@ class _Side:
         unit: float,
     ) -> None:
         half_px, row_px = rough.half / unit, float(line.s[1] - line.s[0]) / unit
-        self._longest = max(_ALONG_PX, 2 * _ALONG_WIDTHS * half_px) / row_px
+        self._longest = longest_px(half_px) / row_px
         toe = gaussian_filter1d(toe, _CALM * self._longest, mode="nearest")
         self._rough, self._toe, self._side, self._unit = rough, toe, side, unit
         self._row_px = row_px
-        self._search = 3 + 0.06 * half_px
+        self._search = 3 + _SEARCHED * half_px
         inside = max(3, min(_WINDOW_PX, int(0.8 * half_px)))
         self._window = Window(_WINDOW_PX, inside)
         self._reach = _WINDOW_PX + int(np.ceil(self._search)) + 3
@@ -201,6 +208,7 @@ class _Side:
             smeared=smeared * self._unit,
             height=places.height,
             bare=places.bare,
+            within=places.within,
             in_frame=self._valid[pick][rows, outside],
             present=self._rough.present[pick],
             disagreement=np.abs(inward) * self._unit,

@@ -17,7 +17,7 @@ from .image import Photo
 from .measurement import TOES, BeadMeasurement
 from .path import find_paths
 from .plane import Plane, Points
-from .refine import Rough, refine_toes
+from .refine import Rough, longest_px, refine_toes
 from .sampling import Strip, sample_strip
 from .toes import Extent, find_toes, strip_look
 from .width import BandEvidence, Toes, assemble
@@ -36,6 +36,8 @@ _BEYOND = {"metal": 0.06, "outer": 0.25}
 """Half widths beside a toe, by its definition, that are neither bead nor plate at first."""
 _ASIDE = 0.03
 """How far beside the bead a given path may run, as a part of the columns looked at."""
+_ROWS_AVERAGED = 4.0
+"""Rows in the longest averaging (Gaussian sigma) that are enough: neighbours tell the same."""
 _SECTIONS = 32
 """Sections in which the band along a given path is looked for."""
 
@@ -87,7 +89,7 @@ def measure_strip(
     """
     beyond = _BEYOND[toe]
     if prior is not None:
-        sparse = _Tracing(24, 6, (0.45,), beyond)
+        sparse = _Tracing(40, 6, (0.45,), beyond)
         measured = _measure(photo, plane, _given_path(photo, plane, prior), start, sparse)
     else:
         dense = _Tracing(40, 1, (0.45, 0.35, 0.25), beyond)
@@ -140,7 +142,7 @@ def _traced(
         path = strip.line.shifted(middle)
         half = float(np.median(extent.half)) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
-    every, along = _row_step(plane, unit)
+    every, along = _row_step(plane, half, unit)
     line = fit_centreline(path, along, max(12.0 * half, 16 * unit))
     rough = _carried(strip, extent, middle, line)
     toes = refine_toes(photo, plane, line, rough, unit, every)
@@ -201,9 +203,11 @@ def _refuse_narrow(photo: Photo, width_px: float) -> None:
         )
 
 
-def _row_step(plane: Plane, unit: float) -> tuple[int, float]:
+def _row_step(plane: Plane, half: float, unit: float) -> tuple[int, float]:
+    """Rows per station and their distance: a px, or more where the averaging takes many."""
     station = STATION_MM if plane.unit == "mm" else STATION_PX
-    count = max(1, int(np.ceil(station / unit)))
+    row = unit * max(1.0, longest_px(half / unit) / _ROWS_AVERAGED)
+    count = max(1, int(np.ceil(station / row)))
     return count, station / count
 
 

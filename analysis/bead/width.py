@@ -39,10 +39,11 @@ class Toes:
     """One side's toes, a value per station: offset and its uncertainties in the plane's unit.
 
     `smeared` is the part of its own waviness that blur and averaging took, rms. `height` is the
-    step from plate to bead (grey levels), `bare` that without the shading beside it, `in_frame`
-    whether the plate beyond is in the photo, `present` how much the inside looks like bead,
-    `disagreement` the distance between the sharpest edge and where the looks change. `distance`
-    is how far bead and plate are apart at this toe, in standard deviations.
+    step from plate to bead (grey levels), `bare` that without the shading beside it, `within`
+    whether an edge is where it was looked for, `in_frame` whether the plate beyond is in the photo,
+    `present` how much the inside looks like bead, `disagreement` the distance between the sharpest
+    edge and where the looks change. `distance` is how far bead and plate are apart at this toe, in
+    standard deviations.
     """
 
     offset: Floats
@@ -51,6 +52,7 @@ class Toes:
     smeared: float
     height: Floats
     bare: Floats
+    within: NDArray[np.bool_]
     in_frame: NDArray[np.bool_]
     present: Floats
     disagreement: Floats
@@ -152,7 +154,7 @@ def _reasons(
     """Why a row is not to be trusted, or ''."""
     reasons = np.full(len(width), "", dtype="U40")
     for name, toe in (("left", left), ("right", right)):
-        reasons[_strays(toe.offset, typical, line)] = f"{name} toe strays"
+        reasons[_strays(toe.offset, typical, line) | ~toe.within] = f"{name} toe strays"
         reasons[toe.u_noise > _FAINT * typical] = f"{name} toe too faint"
         reasons[_faint(toe.height)] = f"{name} toe not told from the plate"
         reasons[~toe.in_frame] = f"{name} toe at the frame of the photo"
