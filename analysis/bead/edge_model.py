@@ -14,6 +14,7 @@ from .edge_shapes import (
     COARSE,
     MODELS,
     Floats,
+    Projected,
     Window,
     basis,
     energy,
@@ -103,6 +104,21 @@ class _Candidate:
     place: float
 
 
+@dataclass(frozen=True, slots=True)
+class _Weighed:
+    """Mean profiles, weighted, the energy of each, and the least misfit that any may have."""
+
+    profiles: Projected
+    whole: Projected
+    floor: float
+
+    @classmethod
+    def of(cls, means: Floats, window: Window) -> "_Weighed":
+        weighted = level_weighted(means, window)
+        floor = GREY_FLOOR + (EDGE_FLOOR * float(np.median(np.ptp(means, axis=1)))) ** 2
+        return cls(weighted, np.einsum("rn,rn->r", weighted, weighted), floor)
+
+
 def _chosen(means: Floats, window: Window) -> tuple[_Candidate, float]:
     """The likely model that would be least wrong if another one were true, and the doubt."""
     tried = _candidates(means, window)
@@ -122,10 +138,11 @@ def _candidates(means: Floats, window: Window) -> list[_Candidate]:
 
     Those that are far less likely than the best are left out.
     """
-    plain = _candidate(means, window, "step")
+    seen = _Weighed.of(means, window)
+    plain = _candidate(seen, window, "step")
     least = _CARRIES * _step(means, window, plain)
     names = [name for name in MODELS if name != plain.name and resolved(name, plain.blur)]
-    richer = sorted((_candidate(means, window, name) for name in names), key=_by_score)
+    richer = sorted((_candidate(seen, window, name) for name in names), key=_by_score)
     kept = [plain]
     for one in richer:
         if one.score > min(kept, key=_by_score).score + _FAR * _price(window):
@@ -189,18 +206,15 @@ def moved(profiles: Floats, rows: NDArray[np.int64], shift: Floats) -> Floats:
     return np.asarray((1 - part) * profiles[at, left] + part * profiles[at, left + 1])
 
 
-def _candidate(means: Floats, window: Window, model: str) -> _Candidate:
+def _candidate(means: _Weighed, window: Window, model: str) -> _Candidate:
     """A model at the blur, between those that are tried, where its misfit is least."""
     shifts = shifts_within(1.5, COARSE)
     bases = subspaces(window, model, _BLURS_PX, 1.5, COARSE)
-    weighted = level_weighted(means, window)
-    captured = energy((weighted @ bases).reshape(len(means), parameters(model), -1))
-    captured = captured.reshape(len(means), len(_BLURS_PX), len(shifts))
-    best = captured.max(axis=2)
+    captured = energy((means.profiles @ bases).reshape(len(means.whole), parameters(model), -1))
+    captured = captured.reshape(len(means.whole), len(_BLURS_PX), len(shifts))
     freedom = max(window.size - parameters(model) - 1, 1.0)
-    misfit = np.median((weighted**2).sum(axis=1)[:, None] - best, axis=0) / freedom
-    floor = GREY_FLOOR + (EDGE_FLOOR * float(np.median(np.ptp(means, axis=1)))) ** 2
-    logs = np.log(np.maximum(misfit, 0) + floor)
+    misfit = np.median(means.whole[:, None] - captured.max(axis=2), axis=0) / freedom
+    logs = np.log(np.maximum(misfit, 0) + means.floor)
     at = int(np.clip(np.argmin(logs), 1, len(logs) - 2))
     a, b, c = logs[at - 1 : at + 2]
     move = float(np.clip(0.5 * (a - c) / max(a - 2 * b + c, 1e-9), -1, 1))
