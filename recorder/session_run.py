@@ -1,6 +1,7 @@
 """One recording from a source: run it into a recorder until it ends or is ended."""
 
 import signal
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -62,12 +63,30 @@ def _run(
     is_simulated = source.pace == "simulated"
     sink: Sink = Pacer(recorder, realtime, duration_s) if is_simulated else recorder
     try:
-        with _alarm(None if is_simulated else duration_s):
+        with _ended_by_signals(), _alarm(None if is_simulated else duration_s):
             return source.run(sink), "the source ended"
     except KeyboardInterrupt:
         return SourceResult(), "interrupted"
     except DurationOver:
         return SourceResult(), "the duration is over"
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Take what `timeout`, `kill` and a terminal that closes send as Ctrl-C, unless ignored."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.getsignal(number) or signal.SIG_DFL for number in numbers}
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

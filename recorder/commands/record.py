@@ -46,7 +46,7 @@ def record(
     snapshot: "Snapshot | None",
     force: bool,
 ) -> Outcome:
-    """Record a live source into a session; Ctrl-C ends the recording and finishes the file."""
+    """Record a live source into a session; Ctrl-C or SIGTERM ends it and finishes the file."""
     from seamlog.config import load_config
     from seamlog.files import check_output
 

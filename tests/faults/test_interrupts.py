@@ -143,8 +143,8 @@ def test_a_handler_that_logs_too_takes_nothing_from_what_it_interrupts(tmp_path:
     assert [m.values[0] for m in encoder] == [float(m.publish_time_ns) for m in encoder]
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_ctrl_c_while_recording(tmp_path: Path, seed: int) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_a_recording(tmp_path: Path, number: signal.Signals) -> None:
     path = tmp_path / "weld.mcap"
     command = [sys.executable, "-m", "seamlog", "record", "--source", "virtual-cell"]
     command += ["--pace", "realtime", "-o", str(path)]
@@ -156,8 +156,8 @@ def test_ctrl_c_while_recording(tmp_path: Path, seed: int) -> None:
         while not (partial.exists() and partial.stat().st_size > 5_000):
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        time.sleep(random.Random(seed).uniform(0.0, 1.0))
-        run.send_signal(signal.SIGINT)
+        time.sleep(random.Random(number).uniform(0.0, 1.0))
+        run.send_signal(number)
         output, errors = run.communicate(timeout=60)
     assert run.returncode in (0, 1), errors
     assert "interrupted" in output
