@@ -21,6 +21,8 @@ _WIDEN_COST = 0.4
 """A bead keeps its width: what a change by a tenth costs, in sections of full evidence."""
 _BROAD = 0.12
 """Power of the width that evidence grows with: of two bands as evident the broader tells more."""
+_SHORTEST = 2
+"""Sections from the first to the last that make a band: fewer have no direction."""
 _FLOOR = 0.15
 """Variance (of scaled features) that any zone has, however flat it looks."""
 
@@ -150,7 +152,8 @@ class BandSearch:
         if allowed is not None:
             by_row = allowed if allowed.ndim > 1 else allowed[None]
             score = score * (by_row if allowed.ndim == 3 else by_row[:, :, None])
-        return _trace(score, self._centres, self._halves[keep], self._slope)
+        band = _trace(score, self._centres, self._halves[keep], self._slope)
+        return band if band is not None and band.last - band.first >= _SHORTEST else None
 
     def holding(self, column: float, slack: float) -> Floats:
         """Weight of bands that hold a column, (1, columns + 1, widths): 1, or less beside it."""

@@ -60,8 +60,10 @@ def doubts(evidence: Evidence) -> list[Doubt]:
     inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
     soft = np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
     less_sharp = np.clip(e.blur_px - _sharp_px(e.width_px), 0, 1)
-    film = np.clip((e.inner - 0.6) / 0.15, 0, 1) * np.clip((1.8 - e.flank) / 0.4, 0, 1)
-    tinted = max(0.5 * soft, inside * less_sharp, film)
+    film = np.clip((e.inner - 0.6) / 0.15, 0, 1) * np.clip((1.6 - e.flank) / 0.3, 0, 1)
+    # Soft toes of a surface rougher than the plate are out of focus or ragged, no fading tint.
+    smooth = 1.0 if np.isinf(e.flank) else np.clip((2.6 - e.flank) / 0.8, 0, 1)
+    tinted = max(smooth * max(0.5 * soft, inside * less_sharp), film)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),

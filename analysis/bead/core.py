@@ -52,7 +52,7 @@ def band_inside(
     central = np.abs(np.arange(columns + 1) - columns / 2) * step < _MIDDLE * half
     search = BandSearch(sections, 0.12 * columns, 0.65 * columns)
     band = search.best(central.astype(np.float32))
-    if band is None or band.last - band.first < 2:
+    if band is None:
         return None
     rows = (np.arange(band.first, band.last + 1) * _ALONG).clip(0, len(line.s) - 1)
     offsets = strip.offset((band.left + band.right) / 2 - 0.5)

@@ -13,8 +13,9 @@ Features = NDArray[np.float32]
 
 _TEXTURE_FLOOR = 1.5
 """Grey levels of detail that count as none: 8-bit rounding and a little camera noise."""
-_SPOT = np.ones((3, 3), np.uint8)
-"""What is textured must be broader than this: a bare edge is no texture."""
+_SPOT = np.ones((7, 7), np.uint8)
+"""What is textured must be broader than this: the energy of a bare edge spreads over 2.5 reaches
+to both sides, and a band as narrow as that at each toe would look like a bead of its own."""
 
 
 def texture_energy(lightness: NDArray[np.float32], reach_px: float) -> NDArray[np.float32]:

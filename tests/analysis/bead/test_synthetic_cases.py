@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from seamlog.analysis.bead.image import make_photo
+from seamlog.analysis.bead.measurement import TOES
 from seamlog.analysis.bead.plane import plane_of
 from seamlog.analysis.bead.strip import measure_strip
 from seamlog.analysis.bead.synthetic import CASES, Scene, render
@@ -56,6 +57,20 @@ def test_width_with_the_path_found_in_the_photo(measure_case: MeasureCase, name:
 def test_a_dark_band_beside_the_bead_is_not_taken_for_it(measure_case: MeasureCase) -> None:
     measured = measure_case("haz + texture", 5, False)
     assert np.median(np.abs(measured.error_px)) <= RMS_PX["haz + texture"]
+
+
+@pytest.mark.parametrize("toe", list(TOES))
+def test_a_bead_partly_out_of_the_photo_is_measured_where_it_is_inside(toe: str) -> None:
+    bead = render(CASES["clean"], 0)
+    photo = make_photo(bead.pixels[200:], "frame.png")
+    result = measure_strip(photo, plane_of(photo, None), toe=toe)
+    assert result.toe_definition.startswith(toe)
+    in_table = plane_of(make_photo(bead.pixels, "whole.png"), bead.calibration)
+    whole_px = result.centre_px[result.good] + (0, 200)
+    true_px = bead.width_at_mm(bead.seam_s_mm(in_table.to_plane(whole_px))) / 0.1
+    assert np.median(np.abs(result.width[result.good] - true_px)) <= 0.2
+    assert 0.1 < result.flagged.mean() < 0.5
+    assert any("frame" in reason for reason in result.reason)
 
 
 @pytest.mark.parametrize("name", ["snr 20", "snr 5", "blur 3"])
