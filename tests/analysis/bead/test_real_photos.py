@@ -13,7 +13,7 @@ from seamlog.analysis.bead.measurement import TRUSTED
 from seamlog.analysis.bead.sources import photo_files
 
 MEDIAN_ERROR = 0.05
-WITHIN_5_PERCENT = 10
+WITHIN_5_PERCENT = 9
 """Of 17; people who drew such contours differ by up to 15 %."""
 WORST_TRUSTED = 0.25
 TINTED = ("149", "161", "194", "25")
