@@ -34,7 +34,8 @@ from .edge_shapes import (
     step_at,
 )
 
-_REACH = 2.5
+_REACH = 4.0
+"""Columns around where an edge is looked for."""
 _SLOW = 61
 """Rows over which what varies more slowly than texture is averaged."""
 
@@ -58,7 +59,7 @@ class EdgePlaces:
 
 
 def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) -> EdgePlaces:
-    """Refine edges of `signal` (rows, columns; bead to the right) within two columns of `near`."""
+    """Refine edges of `signal` (rows, columns; bead to the right) within `_REACH` of `near`."""
     centre = np.rint(near).astype(np.int64)
     seen = profiles_at(signal, centre, model.window)
     plain = seen - shading_along(seen, centre, model)
