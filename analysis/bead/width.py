@@ -81,7 +81,7 @@ def assemble(
     left_px, right_px, centre_px = _points(plane, line, left, right)
     bead = _bead_rows(left.present)
     round_ends = _ends(photo, centre_px, bead, typical, line, unit)
-    reasons[round_ends & (reasons == "")] = END
+    reasons[round_ends] = END
     flagged = reasons != ""
     ends = [_at_frame(photo, centre_px[end], typical / unit) for end in _ends_of(bead)]
     length = np.inf if all(ends) else float(np.ptp(line.s[bead]))
