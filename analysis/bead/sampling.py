@@ -75,12 +75,21 @@ def sample_rows(
     factor = 1
     while 2 * factor <= blur and min(part.shape[:2]) >= 2:
         part, factor = _halved(part), 2 * factor
-    if factor > 1:
+    if factor == 1:
+        part = _deep(part)
+    else:
         x, y = ((at + np.float32(0.5)) / np.float32(factor) - np.float32(0.5) for at in (x, y))
     if blur / factor > 1.3:
         part = cv2.GaussianBlur(part, (0, 0), 0.4 * blur / factor)
     sampled = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return opponent(sampled), valid
+
+
+def _deep(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Pixels of 16 bit, so that samples between them are not rounded to grey levels."""
+    if pixels.dtype == np.uint16:
+        return pixels
+    return np.asarray(np.multiply(pixels, np.uint16(257), dtype=np.uint16))
 
 
 def _inside(at: Floats, size: int) -> NDArray[np.bool_]:
