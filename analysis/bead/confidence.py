@@ -23,12 +23,13 @@ class Evidence:
 
     `apart`: distance of bead and plate at the worse toe, in standard deviations. `band`: evidence
     of the coarse band, 0 to 1. `flagged`: part of the stations. `rival` and `inner`: evidence of
-    the best band beside and inside the found one, relative to it; `nested`: it lies itself inside
-    a more evident one; `sharper`: how many times sharper than its toes a band inside is (0: none,
-    or not looked for). `step_grey`: the weaker toe's step in grey levels; `lengths`: length of the
-    bead in widths (inf where it runs out of the photo at both ends). `width_px`; `astray`: distance
-    between the sharpest edge and the change of looks, part of the width; `blur_px` of the sharper
-    toe.
+    the best band beside and inside the found one, relative to it; `flank`: how much rougher the
+    surface beside the inner one is than the plate (inf: not looked for). `nested`: confidence in
+    the more evident band that it lies inside (0: in none); `sharper`: how many times sharper than
+    its toes a band inside is (0: none, or not looked for). `step_grey`: the weaker toe's step in
+    grey levels; `lengths`: length of the bead in widths (inf where it runs out of the photo at both
+    ends). `width_px`; `astray`: distance between the sharpest edge and the change of looks, part of
+    the width; `blur_px` of the sharper toe.
     """
 
     apart: float
@@ -37,7 +38,7 @@ class Evidence:
     rival: float
     inner: float
     flank: float
-    nested: bool
+    nested: float
     sharper: float
     step_grey: float
     lengths: float
@@ -74,7 +75,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
         (e.step_grey / 8, f"a toe's step is {e.step_grey:.1f} grey levels only"),
         (e.lengths / 10, f"it is {e.lengths:.1f} times as long as wide: a bead is longer"),
         (
-            0.45 if e.nested else 1.0,
+            max(0.45, 1 - e.nested),
             "it lies inside a broader band that is as evident: a heat tint?",
         ),
         (

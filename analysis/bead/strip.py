@@ -104,6 +104,8 @@ def _most_trusted(
     best: BeadMeasurement | None = None
     refusal: Exception | None = None
     for path in paths:
+        if path.band.nested and best is not None:
+            path = replace(path, band=replace(path.band, nested=best.confidence))
         try:
             measured = _measure(photo, plane, path, start, tracing)
         except (EvidenceError, ImageError) as error:
@@ -216,7 +218,7 @@ def _found_paths(photo: Photo, plane: Plane) -> list[_Path]:
     for coarse in find_paths(photo):
         half = float(np.median(coarse.half_width_px)) * plane.unit_per_px(coarse.centre_px)
         evidence = float(coarse.evidence.mean())
-        band = BandEvidence(evidence, coarse.rival, coarse.inner, coarse.nested)
+        band = BandEvidence(evidence, coarse.rival, coarse.inner, float(coarse.nested))
         paths.append(_Path(plane.to_plane(coarse.centre_px), half, band))
     return paths
 

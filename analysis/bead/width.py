@@ -29,7 +29,7 @@ class BandEvidence:
     evidence: float
     rival: float
     inner: float
-    nested: bool
+    nested: float
     sharper: float = 0.0
     flank: float = np.inf
 
