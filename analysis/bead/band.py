@@ -122,21 +122,13 @@ def _contrast(sums: _Sums, centres: range, half: int) -> Floats:
 class BandSearch:
     """Evidence for all bands of `narrowest` to `widest` columns in one feature picture.
 
-    `slope` is the number of columns the centre may move from one section to the next, `ratio`
-    that of a tried width to the next narrower one.
+    `slope` is the number of columns the centre may move from one section to the next.
     """
 
-    def __init__(
-        self,
-        features: Features,
-        narrowest: float,
-        widest: float,
-        slope: int = 1,
-        ratio: float = 1.13,
-    ) -> None:
+    def __init__(self, features: Features, narrowest: float, widest: float, slope: int = 1) -> None:
         self.rows, self.columns = features.shape[:2]
         self._slope = slope
-        count = max(4, int(np.ceil(np.log(widest / narrowest) / np.log(ratio))) + 1)
+        count = max(4, int(np.ceil(np.log(widest / narrowest) / np.log(1.13))) + 1)
         self._halves = (np.geomspace(narrowest, widest, count) / 2).astype(np.float32)
         self._centres = np.arange(self.columns + 1, dtype=np.float32)
         self._evidence = self._score((features / robust_scale(features)).astype(np.float32))

@@ -75,7 +75,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
         (e.step_grey / 8, f"a toe's step is {e.step_grey:.1f} grey levels only"),
         (e.lengths / 10, f"it is {e.lengths:.1f} times as long as wide: a bead is longer"),
         (
-            max(0.45, 1 - e.nested),
+            max(0.45, 1 - e.nested * (0.5 + 0.5 * less_sharp)),
             "it lies inside a broader band that is as evident: a heat tint?",
         ),
         (

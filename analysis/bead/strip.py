@@ -38,7 +38,7 @@ _ASIDE = 0.03
 """How far beside the bead a given path may run, as a part of the columns looked at."""
 _ROWS_AVERAGED = 4.0
 """Rows in the longest averaging (Gaussian sigma) that are enough: neighbours tell the same."""
-_SECTIONS = 32
+_SECTIONS = 48
 """Sections in which the band along a given path is looked for."""
 
 
@@ -229,14 +229,14 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     unit = plane.unit_per_px(plane.to_px(prior))
     length = float(arc_length(prior)[-1])
     reach = min(0.25 * max(photo.width_px, photo.height_px) * unit, 0.5 * length)
-    step = max(unit, reach / 56)
+    step = max(unit, reach / 80)
     line = fit_centreline(prior, step, 6 * step)
     strip = sample_strip(photo, plane, line, reach, step, blur=step / unit)
     features = stack_texture(strip.opponent, 1.5)
     every = max(2, len(features) // _SECTIONS)
     sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
     columns = features.shape[1]
-    search = BandSearch(sections, 3.0, 0.7 * columns, ratio=1.25)
+    search = BandSearch(sections, 3.0, 0.7 * columns)
     band = search.best(search.holding(columns / 2, _ASIDE * columns))
     if band is None:
         raise EvidenceError(
