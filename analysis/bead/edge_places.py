@@ -44,8 +44,8 @@ _SLOW = 61
 class EdgePlaces:
     """Per row: column of the edge, its random standard uncertainty, that of the model, the step.
 
-    `bare` is the step without the shading beside it, `model` says what that is, `blur_px` how
-    blurred the edge is, `within` whether the edge was within reach of where it was looked for.
+    `bare` is the step without the shading beside it, `blur_px` how blurred the edge is, `within`
+    whether the edge was within reach of where it was looked for.
     """
 
     column: Floats
@@ -54,7 +54,6 @@ class EdgePlaces:
     u_model: Floats
     height: Floats
     bare: Floats
-    model: str
     blur_px: float
 
 
@@ -72,7 +71,6 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
         u_model=np.full(len(near), model.u),
         height=_height(seen, shift, model.window, model.blur),
         bare=_height(plain, shift, model.window, model.blur),
-        model=model.name,
         blur_px=model.blur,
     )
 

@@ -38,12 +38,12 @@ class Photo:
         """Columns."""
         return int(self.pixels.shape[1])
 
-    def opponent(self, rows: slice = slice(None), columns: slice = slice(None)) -> NDArray[Any]:
-        """The part as float32 (rows, columns, 3): lightness 0-255, red - green, yellow - blue.
+    def opponent(self) -> NDArray[Any]:
+        """float32 (rows, columns, 3): lightness 0-255, red - green, yellow - blue.
 
         Grey photos have one channel only, shape (rows, columns, 1).
         """
-        return opponent(self.pixels[rows, columns])
+        return opponent(self.pixels)
 
     def as_bgr8(self) -> NDArray[np.uint8]:
         """A copy for drawing, uint8 (rows, columns, 3)."""

@@ -213,7 +213,6 @@ class _Side:
             present=self._rough.present[pick],
             disagreement=np.abs(inward) * self._unit,
             distance=self._distance,
-            model=places.model,
             blur_px=soft_px,
         )
 

@@ -57,7 +57,6 @@ class Toes:
     present: Floats
     disagreement: Floats
     distance: float
-    model: str
     blur_px: float
 
 
