@@ -26,6 +26,8 @@ class Loop(NamedTuple):
     number: Callable[[int, float, float, float], Any]
     picture: Callable[[int, Picture], Any]
     encoded: Callable[[int, bytes], Any]
+    room: Callable[[tuple[int, ...]], Picture] | None = None
+    """Lends memory for the camera to read a picture of a shape into."""
 
 
 def jpeg(image: Picture) -> bytes:
@@ -38,16 +40,16 @@ def no_loop(_stack: ExitStack, _folder: Path) -> Loop:
     return Loop(lambda _t, _a, _b, _c: None, lambda _t, _image: None, lambda _t, _data: None)
 
 
-def own_loop(stack: ExitStack, folder: Path) -> Loop:
-    """The recorder."""
+def own_loop(stack: ExitStack, folder: Path, is_lent: bool = False) -> Loop:
+    """The recorder; its camera reads into memory of its own, or into the recorder's."""
     recorder = stack.enter_context(Recorder(folder / "own.mcap", force=True))
-    put = recorder.channel(TOPIC).put
-    encoded = recorder.channel(PICTURES).put
-    return Loop(
-        put,
-        lambda stamp, image: recorder.log_frame(PICTURES, image, stamp),
-        lambda stamp, data: encoded(stamp, "camera", "jpeg", data),
+    camera = recorder.channel(PICTURES)
+    loop = Loop(
+        recorder.channel(TOPIC).put,
+        camera.put_frame,
+        lambda stamp, data: camera.put(stamp, "camera", "jpeg", data),
     )
+    return loop._replace(room=camera.loan_frame) if is_lent else loop
 
 
 def mcap_loop(stack: ExitStack, folder: Path) -> Loop:

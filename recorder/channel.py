@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from seamlog import plugins
@@ -42,6 +43,7 @@ class Channel:
     """`put(stamp_ns, *values) -> bool`, values in the table's order."""
     put_named: PutNamed
     put_frame: Callable[[int, NDArray[Any]], bool]
+    loan_frame: Callable[[tuple[int, ...]], NDArray[np.uint8]]
     stop: Stop
     """Take nothing more."""
     gate: Gate
@@ -80,7 +82,8 @@ def make_channel(
         ring = fixed_ring(path, channel_id, layout(topic))
         gate = gate_to(topic, ring)
         put, put_named, stop = fixed_put(ring, gate, layout(topic), clock)
-        channel = Channel(topic, metadata, put, put_named, _no_pictures(gate), stop, gate)
+        pictures = _no_pictures(gate), _no_loan
+        channel = Channel(topic, metadata, put, put_named, *pictures, stop, gate)
     else:
         ring = _varying_ring(path, row)
         gate = gate_to(topic, ring)
@@ -119,6 +122,10 @@ def _no_pictures(gate: Gate) -> Callable[[int, NDArray[Any]], bool]:
     return lambda _stamp_ns, _image: gate.refuse("pictures go to a topic of pictures only")
 
 
+def _no_loan(shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    return np.empty(shape, np.uint8)
+
+
 def _varying_ring(path: Path, row: Row) -> Ring:
     if row.schema != IMAGE_SCHEMA:
         return create_ring(path, RING_BYTES, 0)
@@ -134,8 +141,9 @@ def _varying_channel(
     share = _FRAME_SHARE if is_picture else 1.0
     writer = VaryingWriter(ring, gate, channel_id, clock, _encoder(row), share)
     put_frame = writer.put_frame if is_picture else _no_pictures(gate)
+    loan_frame = writer.loan_frame if is_picture else _no_loan
     named = _named(writer.put, row.topic)
-    return Channel(row.topic, metadata, writer.put, named, put_frame, writer.stop, gate)
+    return Channel(row.topic, metadata, writer.put, named, put_frame, loan_frame, writer.stop, gate)
 
 
 def _encoder(row: Row) -> Encode:

@@ -92,6 +92,7 @@ def _ending(channel: Channel) -> Channel:
         until_ended(channel.put),
         until_ended(channel.put_named),
         until_ended(channel.put_frame),
+        channel.loan_frame,
         channel.stop,
         channel.gate,
     )

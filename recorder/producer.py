@@ -9,6 +9,7 @@ from threading import get_ident
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
 from numpy.typing import NDArray
 
 from seamlog.clock import Clock
@@ -75,12 +76,23 @@ class Producer(ABC):
     def log_frame(self, topic: str, image: NDArray[Any], stamp_ns: int | None = None) -> bool:
         """Log a picture, uint8, shape (rows, columns) grey or (rows, columns, 3) BGR.
 
-        The loop pays one copy; the recorder process makes a JPEG of it.
+        The loop pays one copy, none of a picture read into `loan_frame`; the recorder process
+        makes a JPEG of it.
         """
         channel = self._mine.channels.get(topic) or self._late_channel(topic)
         if channel is None:
             return self._turn_away(topic)
         return channel.put_frame(self.clock.now_ns() if stamp_ns is None else stamp_ns, image)
+
+    def loan_frame(self, topic: str, shape: tuple[int, ...]) -> NDArray[np.uint8]:
+        """A picture for the camera to read into and `log_frame` to log, in the recorder's memory.
+
+        Lent until something is logged on this channel, one at a time; what was logged may be
+        read for a while and not written again. Other memory, which `log_frame` copies, where the
+        ring has no room. `ValueError` if `shape` is none.
+        """
+        channel = self._mine.channels.get(topic) or self._late_channel(topic)
+        return np.empty(shape, np.uint8) if channel is None else channel.loan_frame(shape)
 
     def attach(self, name: str, data: bytes, media_type: str) -> None:
         """Put a file into the session, at most `LIMITS.attachment_bytes`.

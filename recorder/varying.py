@@ -1,11 +1,13 @@
 """Messages of varying length: built whole, then copied into their ring."""
 
+import math
 import struct
 from collections.abc import Callable
 from threading import get_ident
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seamlog.clock import Clock
 from seamlog.mcap.records import Buffer
@@ -52,6 +54,8 @@ class VaryingWriter:
         "_is_busy",
         "_known",
         "_limit",
+        "_loan",
+        "_loan_head",
         "_now",
         "_owner",
         "_picture",
@@ -78,26 +82,53 @@ class VaryingWriter:
         self._is_busy = False
         self._picture: tuple[tuple[int, ...], tuple[int, int, int]] = ((), (0, 0, 0))
         """Shape of the last picture, and its rows, columns, samples per pixel."""
+        self._loan: NDArray[np.uint8] | None = None
+        self._loan_head = 0
+        """Where `head` was when the loan was made: it stands behind that."""
 
     def put(self, stamp_ns: int, *values: Any) -> bool:
         """Log one message, values in the table's order."""
-        return self._alone(self._put, stamp_ns, values)
-
-    def put_frame(self, stamp_ns: int, image: Any) -> bool:
-        """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR: one copy."""
-        return self._alone(self._put_frame, stamp_ns, image)
-
-    def _alone(self, act: Callable[[int, Any], bool], stamp_ns: int, values: Any) -> bool:
-        """Do `act` in the owner's thread, but not in a signal's handler that interrupts another."""
-        if get_ident() != self._owner:
-            return self._gate.refuse_foreign()
-        if self._is_busy:
-            return self._gate.refuse("put by a signal's handler while it interrupts a put here")
+        if get_ident() != self._owner or self._is_busy:
+            return self._turn_away()
         self._is_busy = True
         try:
-            return act(stamp_ns, values)
+            return self._put(stamp_ns, values)
         finally:
             self._is_busy = False
+
+    def put_frame(self, stamp_ns: int, image: Any) -> bool:
+        """Log a picture, uint8, shape (rows, columns) or (rows, columns, 3) BGR.
+
+        One copy, none of a picture that stands in a loan.
+        """
+        if get_ident() != self._owner or self._is_busy:
+            return self._turn_away()
+        self._is_busy = True
+        try:
+            return self._put_frame(stamp_ns, image)
+        finally:
+            self._is_busy = False
+
+    def loan_frame(self, shape: tuple[int, ...]) -> NDArray[np.uint8]:
+        """Room in the ring to read a picture of `shape` into; where there is none, other memory."""
+        size = RAW_HEAD.size + math.prod(shape)
+        end = self._end(size)
+        if (
+            get_ident() != self._owner
+            or self._is_busy
+            or ((end > self._limit or size > self._share // 2) and not self._may_lend(size, end))
+        ):
+            return np.empty(shape, np.uint8)
+        at = (end - size) % self._ring.capacity + RAW_HEAD.size
+        self._loan = room = np.ndarray(shape, np.uint8, self._data, at)
+        self._loan_head = self._known[0]
+        return room
+
+    def _turn_away(self) -> bool:
+        """A call of another thread, or of a signal's handler that interrupts one."""
+        if get_ident() != self._owner:
+            return self._gate.refuse_foreign()
+        return self._gate.refuse("put by a signal's handler while it interrupts a put here")
 
     def _put(self, stamp_ns: int, values: tuple[Any, ...]) -> bool:
         try:
@@ -129,6 +160,9 @@ class VaryingWriter:
                 form = _form_of(pixels)
                 self._picture = pixels.shape or (), form
             size = RAW_HEAD.size + pixels.nbytes
+            is_loan = image is self._loan
+            if is_loan and self._loan_head != self._known[0]:
+                raise ValueError("other messages of this channel were put over the loaned picture")
         except Exception as error:  # noqa: BLE001 - values of the caller may raise anything
             return self._gate.refuse(f"{type(error).__name__}: {error}")
         end = self._place(size)
@@ -138,7 +172,10 @@ class VaryingWriter:
         number = (self._known[1] + self._gaps) % _SEQUENCES
         length = size - RECORD_HEAD_BYTES
         RAW_HEAD.pack_into(self._data, at, RAW_FRAME, length, number, time_ns, stamp_ns, *form)
-        if pixels.c_contiguous:
+        if is_loan:
+            self._loan = None
+            image.setflags(write=False)
+        elif pixels.c_contiguous:
             self._data[at + RAW_HEAD.size : at + size] = pixels.cast("B")
         else:
             room = np.frombuffer(self._data, np.uint8, pixels.nbytes, at + RAW_HEAD.size)
@@ -160,14 +197,23 @@ class VaryingWriter:
 
     def _place(self, size: int) -> int:
         """`head` behind a record of `size` bytes, -1 if it was turned away."""
-        head, capacity = self._known[0], self._ring.capacity
-        rest = capacity - head % capacity
-        end = head + size if size <= rest else head + rest + size
+        capacity, end = self._ring.capacity, self._end(size)
         if (end > self._limit or size > self._share // 2) and not self._makes_room(size, end):
             return -1
-        if size > rest:
-            self._data[capacity - rest] = SKIP
+        if end - size > self._known[0]:
+            self._data[self._known[0] % capacity] = SKIP
         return end
+
+    def _end(self, size: int) -> int:
+        """`head` behind a record of `size` bytes, which does not go around the ring's end."""
+        head, capacity = self._known[0], self._ring.capacity
+        rest = capacity - head % capacity
+        return head + size if size <= rest else head + rest + size
+
+    def _may_lend(self, size: int, end: int) -> bool:
+        """Look again how far `head` may go; counts nothing, as nothing was offered yet."""
+        self._limit = self._words[TAIL] + self._share if self._gate.is_open else -1
+        return size <= self._share // 2 and end <= self._limit
 
     def _makes_room(self, size: int, end: int) -> bool:
         """Look again how far `head` may go; turns away what has no room."""
