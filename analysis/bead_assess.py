@@ -9,7 +9,7 @@ from seamlog.results import Input, Part, input_of
 
 from .bead.assess import AssessedPhoto, assess_photos
 from .bead.part import BeadConfig, Pictures, Tables
-from .bead.sources import attached_photos, logged_seam_mm, photo_files
+from .bead.sources import attached_photos, frame_before, logged_seam_mm, photo_files
 from .inspection import InspectionSettings, inspect_photos, stitched
 from .join_part import join_part, no_join
 from .quality.part import QualityConfig
@@ -47,7 +47,8 @@ def bead_and_join(
     if isinstance(whole, AssessedPhoto):
         assessed = [*assessed, whole]
     heights = heights_of(profiles[0][0]) if len(profiles) == 1 else ()
-    parts = [*inspect_photos(assessed, InspectionSettings(quality, None, heights)), *profiles]
+    before = frame_before(session, welds[0].start_ns) if welds else None
+    parts = [*inspect_photos(assessed, InspectionSettings(quality, before, heights)), *profiles]
     if not welds:
         return [*parts, (no_join("the session has no weld", None, inputs), {}, {})]
     for index, weld in enumerate(welds):

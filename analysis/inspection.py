@@ -7,8 +7,8 @@ from seamlog.errors import EvidenceError
 from seamlog.results import Figure, Part, Verdict
 
 from .bead.assess import AssessedPhoto
-from .bead.image import Photo
 from .bead.part import BeadConfig, BeadResult, Pictures, Tables, bead_part
+from .bead.sources import Before
 from .bead.stitch import stitch
 from .bead.uniformity import uniformity
 from .quality.part import QualityConfig, quality_part
@@ -19,10 +19,10 @@ Inspected = tuple[Part, Tables, Pictures]
 
 @dataclass(frozen=True, slots=True)
 class InspectionSettings:
-    """What photos are inspected for: limits, and a photo from before welding to compare with."""
+    """What photos are inspected for: limits, and a picture from before welding to compare with."""
 
     quality: QualityConfig = field(default_factory=QualityConfig)
-    before: Photo | None = None
+    before: Before | None = None
     heights: tuple[Figure, ...] = ()
     """Figures of a laser stripe, where the log has one."""
 

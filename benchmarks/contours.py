@@ -132,12 +132,14 @@ def figures_of(toe: str, found: list[Compared]) -> list[Figure]:
     sure = np.array([each.verdict == "trusted" for each in found])
     far = int((sure & (errors > FAR_PERCENT)).sum())
     needed = f">= {round(len(found) * 12 / 17)}"
+    typical = float(np.nanmedian(errors[sure])) if sure.any() else np.nan
     worst = float(np.nanmax(errors[sure])) if sure.any() else np.nan
     return [
         Figure(f"{toe}: photos", len(found), ""),
         Figure(f"{toe}: within 5 %", int((errors <= 5).sum()), "", needed),
         Figure(f"{toe}: median error of the mean width", float(np.nanmedian(errors)), "%", "<= 5"),
-        Figure(f"{toe}: trusted", int(sure.sum()), ""),
+        Figure(f"{toe}: trusted", int(sure.sum()), "", needed),
+        Figure(f"{toe}: median error of the trusted", typical, "%", "<= 5"),
         Figure(f"{toe}: trusted, off by more than {FAR_PERCENT} %", far, "", "<= 0"),
         Figure(f"{toe}: worst error of a trusted one", worst, "%"),
         Figure(

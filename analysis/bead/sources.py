@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seamlog.calibration import Calibration, load_calibration, parse_calibration
-from seamlog.errors import InputError
+from seamlog.errors import ImageError, InputError
 from seamlog.results import Input, input_of
 
 from .image import Photo, decode_photo, load_photo
@@ -17,8 +17,16 @@ if TYPE_CHECKING:
     from seamlog.session import Session
 
 PHOTO, CALIBRATION = "photo/", "calibration/"
-PATH = "/seam/path"
+PATH, FRAMES = "/seam/path", "/camera/image"
 _SUFFIX = ".calibration.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """A picture of the plate from before welding; one that a user named must show this plate."""
+
+    photo: Photo
+    was_named: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +66,21 @@ def logged_seam_mm(session: "Session") -> Points | None:
     logged = session.columns(PATH)
     x, y = (1e3 * np.asarray(logged[name][-1], dtype=np.float64) for name in ("x_m", "y_m"))
     return np.column_stack([x, y]) if 1 < len(x) == len(y) else None
+
+
+def frame_before(session: "Session", arc_on_ns: int) -> Before | None:
+    """The log's last camera picture from before the arc; None without a whole one."""
+    if FRAMES not in session.info.channels:
+        return None
+    frames = session.frames()
+    earlier = np.flatnonzero(frames.stamps_ns < arc_on_ns)
+    if not len(earlier):
+        return None
+    last = int(earlier[np.argmax(frames.stamps_ns[earlier])])
+    try:
+        return Before(decode_photo(frames[last].data, frames[last].where), was_named=False)
+    except ImageError:
+        return None
 
 
 def attached_photos(session: "Session", calibration: Path | None = None) -> list[PhotoSource]:

@@ -15,6 +15,7 @@ from .bead_synth import synth
 if TYPE_CHECKING:
     from seamlog.analysis.bead.assess import AssessedPhoto
     from seamlog.analysis.bead.plane import Points
+    from seamlog.analysis.bead.sources import Before
     from seamlog.analysis.inspection import Inspected
     from seamlog.results import Columns
 
@@ -43,7 +44,10 @@ def bead() -> None:
     help="Side of the photo at which the weld began.",
 )
 @click.option(
-    "--before", type=click.Path(path_type=Path), help="Photo of the plate from before welding."
+    "--before",
+    type=click.Path(path_type=Path),
+    help="Photo of the plate from before welding; default: the session's last picture before "
+    "the arc, if it shows this plate.",
 )
 @output_option("Results directory.", required=False)
 @config_options
@@ -68,6 +72,7 @@ def measure(
     from seamlog.analysis.bead.assess import AssessedPhoto, assess_photos
     from seamlog.analysis.bead.image import load_photo
     from seamlog.analysis.bead.part import BeadConfig
+    from seamlog.analysis.bead.sources import Before
     from seamlog.analysis.inspection import InspectionSettings, inspect_photos, stitched
     from seamlog.analysis.quality.part import QualityConfig
     from seamlog.analysis.surface.heights import heights_of
@@ -76,15 +81,15 @@ def measure(
     _check_output(output, force)
     settled = load_config(BeadConfig, "bead", config, settings)
     quality = load_config(QualityConfig, "quality", config, settings)
-    earlier = load_photo(before) if before else None
-    profiles = _profiles(session, weld)
+    named = Before(load_photo(before), was_named=True) if before else None
+    profiles, logged = _logged(session, weld)
     sources = _sources(photos, session, calibration)
     assessed = assess_photos(sources, start, settled, weld, _seam_mm(session))
     whole = stitched(assessed, settled)
     if isinstance(whole, AssessedPhoto):
         assessed = [*assessed, whole]
     heights = heights_of(profiles[0]) if profiles else ()
-    parts = inspect_photos(assessed, InspectionSettings(quality, earlier, heights))
+    parts = inspect_photos(assessed, InspectionSettings(quality, named or logged, heights))
     parts += [profiles] if profiles else []
     if output is not None:
         _write(output, parts)
@@ -119,17 +124,19 @@ def _sources(photos: tuple[Path, ...], session: Path | None, calibration: Path |
     return found
 
 
-def _profiles(session: Path | None, number: int | None) -> "Inspected | None":
-    """Laser profiles of the weld, if the session has some."""
+def _logged(session: Path | None, number: int | None) -> "tuple[Inspected | None, Before | None]":
+    """Laser profiles of the weld and a picture from before it, if the session has some."""
+    from seamlog.analysis.bead.sources import frame_before
     from seamlog.analysis.surface.heights import heights_part
     from seamlog.analysis.welds import chosen_welds
     from seamlog.session import open_session
 
     if session is None:
-        return None
+        return None, None
     with open_session(session) as opened:
         welds = chosen_welds(opened, number)
-        return heights_part(opened, welds[0] if len(welds) == 1 else None)
+        before = frame_before(opened, welds[0].start_ns) if welds else None
+        return heights_part(opened, welds[0] if len(welds) == 1 else None), before
 
 
 def _seam_mm(session: Path | None) -> "Points | None":

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from seamlog.analysis.bead.image import Photo
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead.plane import Plane
+from seamlog.analysis.bead.sources import Before
 from seamlog.errors import EvidenceError
 from seamlog.results import Columns, Figure, Finding, Input, Part, Picture, Place, Severity
 
@@ -37,7 +38,7 @@ def surface_part(
     photo: Photo,
     plane: Plane,
     bead: BeadMeasurement,
-    before: Photo | None = None,
+    before: Before | None = None,
     inputs: Sequence[Input] = (),
     index: int = 1,
     weld: int | None = None,
@@ -49,6 +50,8 @@ def surface_part(
     """
     name = photo.name.rsplit("/", 1)[-1]
     spatter, refusal = _spatter(photo, plane, bead, before)
+    was_compared = spatter is not None and spatter.known_before is not None
+    compared = before.photo.name if before is not None and was_compared else None
     ends, gaps = bead_ends(bead), bead_gaps(bead)
     candidates = find_candidates(photo, plane, bead) if bead.trusted else []
     part = Part(
@@ -65,7 +68,7 @@ def surface_part(
             *(heights or (_unseen(*item) for item in HEIGHTS.items())),
         ],
         findings=_findings(ends, gaps, candidates, bead, weld),
-        details={"unit": bead.unit, "before": before.name if before else None},
+        details={"unit": bead.unit, "before": compared},
     )
     pictures = {}
     if spatter is not None:
@@ -82,14 +85,17 @@ def surface_part(
 
 
 def _spatter(
-    photo: Photo, plane: Plane, bead: BeadMeasurement, before: Photo | None
+    photo: Photo, plane: Plane, bead: BeadMeasurement, before: Before | None
 ) -> tuple[Spatter | None, str]:
     if not bead.trusted:
         return None, f"the bead itself is doubtful (confidence {bead.confidence:.2f})"
     try:
-        return find_spatter(photo, plane, bead, before), ""
+        return find_spatter(photo, plane, bead, before.photo if before else None), ""
     except EvidenceError as error:
-        return None, str(error)
+        if before is None or before.was_named:
+            return None, str(error)
+    # The log's camera need not have seen this plate.
+    return _spatter(photo, plane, bead, None)
 
 
 def _spatter_figures(spatter: Spatter | None, refusal: str, bead: BeadMeasurement) -> list[Figure]:
@@ -130,7 +136,7 @@ def _how_far(spatter: Spatter) -> str:
     text = f"from {spatter.smallest:.2g} {spatter.unit} across, up to {spatter.reach:.3g} "
     text += f"{spatter.unit} from the bead"
     if spatter.known_before is None:
-        return f"{text}; without a photo from before welding, marks of the plate count too"
+        return f"{text}; without a picture from before welding, marks of the plate count too"
     return f"{text}; {spatter.known_before} marks were there before welding and do not count"
 
 

@@ -30,6 +30,8 @@ _LEAST_PX = 1.5
 REACH = 4.0
 """How far from the bead spatter is looked for, in bead widths."""
 _MARGIN = 0.03
+_SHOWN = 0.9
+"""Part of the photo that the one from before must show."""
 _SAME = 0.5
 """Part of a blob's contrast that a mark has on the photo from before if it was there already."""
 
@@ -62,14 +64,15 @@ def find_spatter(
     photo: Photo, plane: Plane, bead: BeadMeasurement, before: Photo | None = None
 ) -> Spatter:
     """Spatter on the plate; `EvidenceError` where the photo from before does not fit this one."""
+    earlier = None if before is None else _registered(photo, before)
     width_px = float(np.nanmedian(bead.width)) / bead.unit_per_px
     low, high = _radii_px(bead, width_px)
     plate = plate_mask(photo, bead, width_px)
     light = np.ascontiguousarray(photo.opponent()[..., 0])
     blobs = find_blobs(light, plate, low, high)
     known = None
-    if before is not None:
-        fresh = ~_were_there(blobs, photo, before)
+    if earlier is not None:
+        fresh = ~_were_there(blobs, earlier)
         known = int((~fresh).sum())
         blobs = blobs.chosen(fresh)
     places = np.column_stack([blobs.x_px, blobs.y_px])
@@ -136,9 +139,8 @@ def _unit_at(places: Points, plane: Plane) -> Floats:
 _HALVES = (np.array([0.5, 0.0]), np.array([0.0, 0.5]))
 
 
-def _were_there(blobs: Blobs, photo: Photo, before: Photo) -> Mask:
+def _were_there(blobs: Blobs, earlier: Grid) -> Mask:
     """Which blobs have their like on the photo from before, brought over this one."""
-    earlier = _registered(photo, before)
     found = np.zeros(len(blobs), dtype=bool)
     for index in range(len(blobs)):
         x, y, radius = blobs.x_px[index], blobs.y_px[index], blobs.radius_px[index]
@@ -168,4 +170,10 @@ def _registered(photo: Photo, before: Photo) -> Grid:
         )
     earlier = np.ascontiguousarray(before.opponent()[..., 0])
     size = (photo.width_px, photo.height_px)
+    shown = float(cv2.warpPerspective(np.ones_like(earlier), matrix, size).mean())
+    if shown < _SHOWN:
+        raise EvidenceError(
+            f"{before.name} shows {100 * shown:.0f} % of {photo.name} only: marks from before "
+            "welding cannot be told from spatter on the rest"
+        )
     return np.asarray(cv2.warpPerspective(earlier, matrix, size, borderMode=cv2.BORDER_REPLICATE))

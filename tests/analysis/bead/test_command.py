@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from seamlog.analysis.bead.synthetic import Scene, render
+from seamlog.analysis.surface.synthetic_spatter import spattered
+from seamlog.channels import ARC_OFF, ARC_ON
 from seamlog.cli import ExitCode, main
+from seamlog.clock import SIMULATED_EPOCH_NS, SimulatedClock
+from seamlog.recorder import Recorder
 from seamlog.results import Results, Verdict
 
 
@@ -129,3 +133,40 @@ def test_photos_of_different_beads_are_not_stitched(
     document = json.loads(out)
     assert (code, len(document["photos"])) == (ExitCode.PASS, 2)
     assert "photos 1 and 2" in document["not_stitched"]
+
+
+def recorded_with(frame: np.ndarray, path: Path) -> Path:
+    """A session of one weld with one camera picture from before its arc."""
+    first = SIMULATED_EPOCH_NS
+    clock = SimulatedClock(first)
+    with Recorder(path, clock=clock, pace="simulated", force=True) as recorder:
+        recorder.log_frame("/camera/image", frame, first)
+        for seconds, kind in ((1, ARC_ON), (10, ARC_OFF)):
+            clock.advance_to(first + seconds * 10**9)
+            recorder.log("/events", first + seconds * 10**9, kind=kind, detail="")
+    return path
+
+
+def test_marks_on_a_picture_of_the_log_from_before_the_arc_do_not_count(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = spattered(Scene(width_px=800, noise=2, texture=6), 40, 7)
+    photo = tmp_path / "plate.png"
+    assert cv2.imwrite(str(photo), case.photo.pixels)
+    session = recorded_with(np.roll(case.photo.pixels, (6, -9), axis=(0, 1)), tmp_path / "w.mcap")
+    command = ["bead", "measure", str(photo), "--json"]
+    counts = {}
+    for name, more in {
+        "photo alone": [],
+        "plate in the log": ["--session", str(session)],
+        "something else in the log": [
+            "--session",
+            str(recorded_with(np.zeros((200, 300), np.uint8), tmp_path / "other.mcap")),
+        ],
+    }.items():
+        code, out, _ = run([*command, *more], capsys)
+        assert code == ExitCode.PASS
+        counts[name] = json.loads(out)["photos"][0]["surface"]["spatter_count"]
+    assert counts["photo alone"] == pytest.approx(len(case.drops), abs=4)
+    assert counts["plate in the log"] <= 2
+    assert counts["something else in the log"] == counts["photo alone"]

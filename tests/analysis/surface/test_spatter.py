@@ -74,3 +74,10 @@ def test_streaks_and_edges_are_no_blobs() -> None:
     inside = np.ones(picture.shape, dtype=bool)
     assert len(find_blobs(picture, inside, 1.5, 8)) == 0
     assert len(find_blobs(picture, np.zeros_like(inside), 1.5, 8)) == 0
+
+
+def test_a_picture_that_shows_a_part_only_cannot_tell_what_was_there() -> None:
+    case = spattered(Scene(width_px=800, noise=2, texture=6), 40, 7)
+    part = make_photo(case.photo.pixels[:, :500].copy(), "half")
+    with pytest.raises(EvidenceError, match=r"half shows \d\d % of .* only"):
+        find_spatter(case.photo, case.plane, case.bead, part)
