@@ -5,8 +5,10 @@ dynamic programming from section to section finds the pair sequence with the mos
 free start and stop, so that a bead that ends inside the picture ends there.
 """
 
+import itertools
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +25,8 @@ _BROAD = 0.12
 """Power of the width that evidence grows with: of two bands as evident the broader tells more."""
 _SHORTEST = 2
 """Sections from the first to the last that make a band: fewer have no direction."""
+_NEGLIGIBLE = 1e-3
+"""Weight below which a band is not looked at."""
 _FLOOR = 0.15
 """Variance (of scaled features) that any zone has, however flat it looks."""
 
@@ -45,39 +49,27 @@ class Band:
 class _Sums:
     """Running sums along each section, so that any window's mean is a difference of two slices.
 
-    Kept as (features, rows, columns), padded so that windows may reach over the borders.
+    Of the features and of their squares, (2, features, rows, columns), padded so that windows may
+    reach over the borders.
     """
 
     def __init__(self, features: Floats) -> None:
-        self.columns = features.shape[1]
-        planes = np.ascontiguousarray(np.moveaxis(features, 2, 0))
-        self._first, self._second = self._running(planes), self._running(planes * planes)
+        rows, self.columns, count = features.shape
+        planes = np.moveaxis(features, 2, 0)
+        total = np.cumsum(np.stack([planes, planes * planes]), axis=3, dtype=np.float64)
+        size = 3 * self.columns + 1
+        self._sums = np.zeros((2, count, rows, size), dtype=np.float32)
+        self._sums[..., self.columns + 1 : 2 * self.columns + 1] = total
+        self._sums[..., 2 * self.columns + 1 :] = total[..., -1:]
+        self._known = np.clip(np.arange(size) - self.columns, 0, self.columns).astype(np.float32)
 
-    def _running(self, planes: Floats) -> Floats:
-        total = np.cumsum(planes, axis=2, dtype=np.float64).astype(np.float32)
-        pads = ((0, 0), (0, 0), (self.columns + 1, self.columns))
-        return np.pad(np.pad(total, (*pads[:2], (0, 0))), pads, mode="edge") * self._known(pads)
-
-    def _known(self, pads: tuple[tuple[int, int], ...]) -> Floats:
-        """0 left of the first column, where an edge pad would repeat its sum, else 1."""
-        known = np.ones(self.columns + sum(pads[2]), dtype=np.float32)
-        known[: pads[2][0]] = 0
-        return known
-
-    def window(self, centres: range, start: int, stop: int) -> tuple[Floats, Floats]:
-        """Mean and variance of columns [c + start, c + stop) for each c, (features, rows, c)."""
-        at = np.arange(centres.start, centres.stop)
-        inside = np.clip(at + stop, 0, self.columns) - np.clip(at + start, 0, self.columns)
-        count = np.maximum(inside, 1).astype(np.float32)
-        mean = self._between(self._first, centres, start, stop) / count
-        square = self._between(self._second, centres, start, stop) / count
-        return mean, np.maximum(square - mean * mean, 0)
-
-    def _between(self, sums: Floats, centres: range, start: int, stop: int) -> Floats:
+    def window(self, centres: range, start: int, stop: int) -> Floats:
+        """Means over columns [c + start, c + stop) for each c, (2, features, rows, c)."""
         first, last = centres.start + self.columns, centres.stop + self.columns
-        return np.asarray(
-            sums[..., first + stop : last + stop] - sums[..., first + start : last + start]
-        )
+        before, up_to = slice(first + start, last + start), slice(first + stop, last + stop)
+        total = self._sums[..., up_to] - self._sums[..., before]
+        total /= np.maximum(self._known[up_to] - self._known[before], 1)
+        return np.asarray(total)
 
 
 def _saturate(square: Floats, half_at: float) -> Floats:
@@ -89,16 +81,20 @@ def edge_evidence(features: Features, reach: int) -> Floats:
 
     The change between the two windows of `reach` columns on both sides, against their spread.
     """
-    return _edges(_Sums(features), features.shape[0], reach)
-
-
-def _edges(sums: _Sums, rows: int, reach: int) -> Floats:
-    at = range(reach, sums.columns - reach + 1)
-    mean_a, var_a = sums.window(at, -reach, 0)
-    mean_b, var_b = sums.window(at, 0, reach)
-    square = ((mean_a - mean_b) ** 2 / (0.5 * (var_a + var_b) + _FLOOR)).sum(axis=0)
-    result = np.zeros((rows, sums.columns + 1), dtype=np.float32)
-    result[:, at.start : at.stop] = _saturate(square, 1.5)
+    rows, columns, count = features.shape
+    both = np.full((1, 2 * reach), 0.5 / reach, dtype=np.float32)
+    apart = both * np.repeat(np.float32([-2, 2]), reach)
+    mean, square, change = (
+        cv2.filter2D(values, -1, kernel).reshape(features.shape)
+        for values, kernel in ((features, both), (features * features, both), (features, apart))
+    )
+    change *= change
+    spread = square - mean * mean - change / 4
+    change /= np.maximum(spread, 0, out=spread) + np.float32(_FLOOR)
+    total = cv2.transform(change, np.ones((1, count), dtype=np.float32))
+    result = np.zeros((rows, columns + 1), dtype=np.float32)
+    inner = slice(reach, columns - reach + 1)
+    result[:, inner] = _saturate(total[:, inner], 1.5)
     return result
 
 
@@ -110,115 +106,120 @@ def _contrast(sums: _Sums, centres: range, half: int) -> Floats:
     counts up to a quarter more.
     """
     reach = max(4, 2 * half)
-    inside, spread = sums.window(centres, -half, half)
-    one, spread_one = sums.window(centres, -half - reach, -half)
-    two, spread_two = sums.window(centres, half, half + reach)
-    apart = (spread_one + spread_two) / 2 + ((one - two) / 2) ** 2
-    square = (inside - (one + two) / 2) ** 2 / (0.5 * (spread + apart) + _FLOOR)
-    rougher = np.maximum(inside[-1] - np.maximum(one[-1], two[-1]), 0)
-    return np.asarray(_saturate(square.sum(axis=0), 2.0) * (1 + 0.25 * np.tanh(rougher)))
+    one = sums.window(centres, -half - reach, -half)
+    two = sums.window(centres, half, half + reach)
+    (inside, square), (around, square_around) = sums.window(centres, -half, half), (one + two) / 2
+    spread = (square + square_around - inside * inside - around * around) / 2
+    change = (inside - around) ** 2 / (np.maximum(spread, 0) + np.float32(_FLOOR))
+    rougher = np.maximum(inside[-1] - np.maximum(one[0, -1], two[0, -1]), 0)
+    return np.asarray(_saturate(change.sum(axis=0), 2.0) * (1 + 0.25 * np.tanh(rougher)))
 
 
 class BandSearch:
     """Evidence for all bands of `narrowest` to `widest` columns in one feature picture.
 
-    `slope` is the number of columns the centre may move from one section to the next.
+    `slope` is the number of columns the centre may move from one section to the next. Of bands
+    that do not hold the column `held[0]` the evidence counts less, by a Gaussian of their distance
+    from it with the sigma `held[1]`.
     """
 
-    def __init__(self, features: Features, narrowest: float, widest: float, slope: int = 1) -> None:
+    def __init__(
+        self,
+        features: Features,
+        narrowest: float,
+        widest: float,
+        slope: int = 1,
+        held: tuple[float, float] | None = None,
+    ) -> None:
         self.rows, self.columns = features.shape[:2]
         self._slope = slope
         count = max(4, int(np.ceil(np.log(widest / narrowest) / np.log(1.13))) + 1)
         self._halves = (np.geomspace(narrowest, widest, count) / 2).astype(np.float32)
-        self._centres = np.arange(self.columns + 1, dtype=np.float32)
-        self._evidence = self._score((features / robust_scale(features)).astype(np.float32))
+        weight = (2 * self._halves[:, None] / self.columns) ** np.float32(_BROAD)
+        column, slack = held or (self.columns / 2, np.inf)
+        beside = np.abs(np.arange(self.columns + 1) - column) - self._halves[:, None]
+        weight = weight * np.exp(-0.5 * (np.maximum(beside, 0) / slack) ** 2)
+        scaled = (features / robust_scale(features)).astype(np.float32)
+        self._evidence = self._score(scaled, weight.astype(np.float32))
 
     def best(self, allowed: Floats | None = None, widest: float = np.inf) -> Band | None:
         """The band with the most evidence, or None without any.
 
         `allowed`, shape (columns + 1,) or (rows, columns + 1), multiplies the evidence by the
-        band's centre, or by its width as well (`holding`); `widest` leaves broader ones out.
+        band's centre; `widest` leaves broader ones out.
         """
         keep = 2 * self._halves <= max(widest, 2 * self._halves[0])
-        score = self._evidence[:, :, keep]
+        score = self._evidence[:, keep]
         if allowed is not None:
-            by_row = allowed if allowed.ndim > 1 else allowed[None]
-            score = score * (by_row if allowed.ndim == 3 else by_row[:, :, None])
-        band = _trace(score, self._centres, self._halves[keep], self._slope)
+            score = score * np.atleast_2d(allowed)[:, None]
+        band = _trace(score, self._halves[keep], self._slope)
         return band if band is not None and band.last - band.first >= _SHORTEST else None
 
-    def holding(self, column: float, slack: float) -> Floats:
-        """Weight of bands that hold a column, (1, columns + 1, widths): 1, or less beside it."""
-        beside = np.abs(self._centres[:, None] - np.float32(column)) - self._halves
-        return np.exp(-0.5 * (np.maximum(beside, 0) / np.float32(slack)) ** 2)[None]
+    def _score(self, features: Features, weight: Floats) -> Floats:
+        """Evidence per section, half width and centre, shape (rows, halves, centres).
 
-    def _score(self, features: Features) -> Floats:
-        """Evidence per section, centre and half width, shape (rows, centres, halves)."""
-        rows, sums = len(features), _Sums(features)
-        edges = np.maximum(_edges(sums, rows, 2), _edges(sums, rows, 4))
-        near = edges.copy()
-        near[:, 1:] = np.maximum(near[:, 1:], edges[:, :-1])
-        near[:, :-1] = np.maximum(near[:, :-1], edges[:, 1:])
-        score = np.zeros((rows, len(self._centres), len(self._halves)), dtype=np.float32)
-        for k, exact in enumerate(self._halves):
-            half = max(1, round(float(exact)))
-            whole = range(half + 1, self.columns - half)
-            if len(whole):
-                left = near[:, whole.start - half : whole.stop - half]
-                right = near[:, whole.start + half : whole.stop + half]
-                broad = np.float32((2 * float(exact) / self.columns) ** _BROAD)
-                sharp = np.sqrt(np.sqrt(left * right))
-                score[:, whole.start : whole.stop, k] = _contrast(sums, whole, half) * sharp * broad
+        `weight`, (halves, centres), multiplies it.
+        """
+        sums = _Sums(features)
+        edges = np.maximum(edge_evidence(features, 2), edge_evidence(features, 4))
+        near = cv2.dilate(edges, np.ones((1, 3), np.uint8))
+        score = np.zeros((self.rows, *weight.shape), dtype=np.float32)
+        whole = np.maximum(1, np.rint(self._halves)).astype(int)
+        for half in np.unique(whole).tolist():
+            alike = whole == half
+            counts = weight[alike].max(axis=0)[half + 1 : self.columns - half] > _NEGLIGIBLE
+            if counts.any():
+                first, last = half + 1 + np.flatnonzero(counts)[[0, -1]]
+                at = range(first, last + 1)
+                left, right = (near[:, at.start + out : at.stop + out] for out in (-half, half))
+                found = _contrast(sums, at, half) * np.sqrt(np.sqrt(left * right))
+                score[:, alike, at.start : at.stop] = (
+                    found[:, None] * weight[alike, first : last + 1]
+                )
         return score
 
 
-def _trace(score: Floats, centres: Floats, halves: Floats, slope: int) -> Band | None:
-    """Dynamic programming over the sections with free start and stop."""
-    moves = [(dc, dh) for dc in range(-slope, slope + 1) for dh in (-1, 0, 1)]
-    rows, wide, high = score.shape
-    padded = np.full((wide + 2 * slope, high + 2), -np.inf, dtype=np.float32)
-    value = np.zeros((wide, high), dtype=np.float32)
-    came = np.full(score.shape, -1, dtype=np.int8)
-    totals = np.empty(rows, dtype=np.float64)
-    ends = np.empty(rows, dtype=np.int64)
-    for row in range(rows):
-        padded[slope : slope + wide, 1 : 1 + high] = value
-        best = np.zeros_like(value)
-        for index, (dc, dh) in enumerate(moves):
-            cost = np.float32(_MOVE_COST * abs(dc) + _WIDEN_COST * abs(dh))
-            other = padded[slope - dc : slope - dc + wide, 1 - dh : 1 - dh + high] - cost
-            came[row][other > best] = index
-            np.maximum(best, other, out=best)
-        value = best + score[row] - np.float32(_EVIDENT)
-        ends[row] = int(np.argmax(value))
-        totals[row] = value.flat[ends[row]]
-    last = int(np.argmax(totals))
+def _trace(score: Floats, halves: Floats, slope: int) -> Band | None:
+    """Dynamic programming over the sections with free start and stop.
+
+    A row's states lie flat, their edges padded, so that a move is a shift.
+    """
+    rows, high, wide = score.shape
+    stride = wide + 2 * slope
+    padded = np.full((rows, high + 2, stride), -np.inf, dtype=np.float32)
+    padded[:, 1:-1, slope : slope + wide] = score - np.float32(_EVIDENT)
+    gathered = padded.reshape(rows, -1)
+    for before, now in itertools.pairwise(gathered):
+        best = np.maximum(before[: -2 * stride], before[2 * stride :]) - np.float32(_WIDEN_COST)
+        np.maximum(best, before[stride:-stride], out=best)
+        for _ in range(slope):
+            moved = np.maximum(best[:-2], best[2:]) - np.float32(_MOVE_COST)
+            np.maximum(best[1:-1], moved, out=best[1:-1])
+        now[stride:-stride] += np.maximum(best, 0, out=best)
+    ends = gathered.argmax(axis=1)
+    totals = gathered[np.arange(rows), ends]
+    last = int(totals.argmax())
     if totals[last] <= 0:
         return None
-    return _walk_back(score, came, moves, centres, halves, last, int(ends[last]), totals[last])
+    first, states = _walk_back(gathered[: last + 1], int(ends[last]), stride, slope)
+    h, c = states // stride - 1, states % stride - slope
+    evidence = score[np.arange(first, last + 1), h, c].astype(np.float64)
+    half = halves[h].astype(np.float64)
+    return Band(first, last, c - half, c + half, evidence, float(totals[last]))
 
 
 def _walk_back(
-    score: Floats,
-    came: NDArray[np.int8],
-    moves: list[tuple[int, int]],
-    centres: Floats,
-    halves: Floats,
-    last: int,
-    end: int,
-    total: float,
-) -> Band:
-    c, h = divmod(end, len(halves))
-    path = []
-    row = last
-    while row >= 0:
-        path.append((c, h, score[row, c, h]))
-        move = came[row, c, h]
-        if move < 0:
+    gathered: Floats, end: int, stride: int, slope: int
+) -> tuple[int, NDArray[np.int64]]:
+    """First row of the sequence that leads to the state `end` of the last, and its states."""
+    dc, dh = (move.ravel() for move in np.mgrid[-slope : slope + 1, -1:2])
+    cost = (_MOVE_COST * abs(dc) + _WIDEN_COST * abs(dh)).astype(np.float32)
+    states = [end]
+    for before in gathered[-2::-1]:
+        came = states[-1] - dc - stride * dh
+        value = before[came] - cost
+        best = value.argmax()
+        if value[best] <= 0:
             break
-        c, h = c - moves[move][0], h - moves[move][1]
-        row -= 1
-    at = np.array([(c, h) for c, h, _ in reversed(path)])
-    evidence = np.array([float(e) for _, _, e in reversed(path)])
-    middle, half = centres[at[:, 0]].astype(np.float64), halves[at[:, 1]].astype(np.float64)
-    return Band(last - len(at) + 1, last, middle - half, middle + half, evidence, float(total))
+        states.append(came[best])
+    return len(gathered) - len(states), np.array(states[::-1])

@@ -236,8 +236,8 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     every = max(2, len(features) // _SECTIONS)
     sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
     columns = features.shape[1]
-    search = BandSearch(sections, 3.0, 0.7 * columns)
-    band = search.best(search.holding(columns / 2, _ASIDE * columns))
+    held = (columns / 2, _ASIDE * columns)
+    band = BandSearch(sections, 3.0, 0.7 * columns, held=held).best()
     if band is None:
         raise EvidenceError(
             f"{photo.name}: no bead can be told from the plate along the given path; check that "
