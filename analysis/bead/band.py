@@ -82,20 +82,23 @@ def edge_evidence(features: Features, reach: int) -> Floats:
     The change between the two windows of `reach` columns on both sides, against their spread.
     """
     rows, columns, count = features.shape
-    both = np.full((1, 2 * reach), 0.5 / reach, dtype=np.float32)
-    apart = both * np.repeat(np.float32([-2, 2]), reach)
-    mean, square, change = (
-        cv2.filter2D(values, -1, kernel).reshape(features.shape)
-        for values, kernel in ((features, both), (features * features, both), (features, apart))
-    )
+    both = np.full(2 * reach, 0.5 / reach)
+    change = _summed(features, np.repeat([-1.0, 1.0], reach) / reach)
+    mean, square = _summed(features, both), _summed(features * features, both)
     change *= change
     spread = square - mean * mean - change / 4
     change /= np.maximum(spread, 0, out=spread) + np.float32(_FLOOR)
     total = cv2.transform(change, np.ones((1, count), dtype=np.float32))
     result = np.zeros((rows, columns + 1), dtype=np.float32)
     inner = slice(reach, columns - reach + 1)
-    result[:, inner] = _saturate(total[:, inner], 1.5)
+    result[:, inner] = _saturate(np.asarray(total[:, inner], dtype=np.float32), 1.5)
     return result
+
+
+def _summed(features: Floats, weights: NDArray[np.float64]) -> Floats:
+    """Weighted sums of the columns around each column edge."""
+    found = cv2.filter2D(features, -1, weights[None].astype(np.float32))
+    return np.asarray(found, dtype=np.float32).reshape(features.shape)
 
 
 def _contrast(sums: _Sums, centres: range, half: int) -> Floats:
