@@ -8,7 +8,16 @@ from seamlog.errors import EvidenceError, ImageError, SeamlogError
 from seamlog.results import Figure, Part, Verdict
 
 from .measurement import TRUSTED
-from .part import BeadConfig, BeadResult, Pictures, Tables, bead_part, measure_photo
+from .part import (
+    BeadConfig,
+    BeadResult,
+    Pictures,
+    Tables,
+    bead_part,
+    measure_photo,
+    other_toe,
+    with_other_toe,
+)
 from .plane import Points
 from .sources import PhotoSource
 
@@ -36,7 +45,7 @@ class AssessedPhoto:
 
 
 def _summary(part: Part, result: BeadResult) -> dict[str, Any]:
-    m, even = result.measurement, result.uniformity
+    m, even, aside = result.measurement, result.uniformity, result.by_other_toe
     return {
         "verdict": part.verdict.value,
         "refused": None,
@@ -52,6 +61,8 @@ def _summary(part: Part, result: BeadResult) -> dict[str, Any]:
         "confidence": m.confidence,
         "trusted_from": TRUSTED,
         "toe_definition": m.toe_definition,
+        "other_toe": other_toe(part.configuration["toe"]),
+        "mean_width_by_other_toe": aside.mean if aside else None,
         "starts_at": m.starts_at,
         "warnings": list(m.warnings),
     }
@@ -81,10 +92,11 @@ def _assess(
 ) -> AssessedPhoto:
     name = source.photo.name
     try:
-        result = measure_photo(source.photo, source.calibration, start, config, seam_mm)
+        measured = measure_photo(source.photo, source.calibration, start, config, seam_mm)
     except (EvidenceError, ImageError) as error:
         part = _refused(source, config, index, weld, str(error))
         return AssessedPhoto(part, {}, {}, None, error, name)
+    result = with_other_toe(measured, start, config, seam_mm)
     part, tables, pictures = bead_part(result, source.inputs, config, index, weld)
     if source.calibration is not None:
         known = source.calibration.model_dump(

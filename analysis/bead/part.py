@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict
 from seamlog.analysis.quality.judge import judge
 from seamlog.analysis.quality.stations import doubt, station_criterion
 from seamlog.calibration import Calibration
-from seamlog.errors import EvidenceError
+from seamlog.errors import EvidenceError, ImageError
 from seamlog.plugins import load
 from seamlog.results import (
     Columns,
@@ -28,7 +28,7 @@ from seamlog.results import (
 )
 
 from .image import Photo
-from .measurement import END, BeadDetector, BeadMeasurement
+from .measurement import END, TOES, BeadDetector, BeadMeasurement
 from .overlay import overlay_webp
 from .plane import Plane, Points, plane_of
 from .uniformity import Uniformity, uniformity
@@ -58,6 +58,8 @@ class BeadResult:
     uniformity: Uniformity | None
     plane: Plane | None = None
     calibration: Calibration | None = None
+    by_other_toe: Uniformity | None = None
+    """Figures by the other definition of the toe, where these can be trusted as well."""
 
 
 def measure_photo(
@@ -86,6 +88,23 @@ def measure_photo(
     return BeadResult(photo, measurement, uniformity(measurement), plane, calibration)
 
 
+def with_other_toe(
+    result: BeadResult, start: str | None, config: BeadConfig, seam_mm: Points | None
+) -> BeadResult:
+    """`result` with the figures that the other definition of the toe gives for its photo."""
+    other = config.model_copy(update={"toe": other_toe(config.toe)})
+    with contextlib.suppress(EvidenceError, ImageError):
+        found = measure_photo(result.photo, result.calibration, start, other, seam_mm)
+        if found.measurement.trusted:
+            return replace(result, by_other_toe=found.uniformity)
+    return result
+
+
+def other_toe(toe: str) -> str:
+    """The other one of the two definitions."""
+    return next(name for name in TOES if name != toe)
+
+
 def bead_part(
     result: BeadResult,
     inputs: Sequence[Input] = (),
@@ -106,7 +125,7 @@ def bead_part(
         configuration=config.model_dump(),
         verdict=worst([criterion.verdict for criterion in criteria]),
         reason=_reason(criteria),
-        figures=_figures(result),
+        figures=_figures(result, other_toe(config.toe)),
         criteria=criteria,
         findings=_findings(m, weld),
         details={
@@ -161,13 +180,15 @@ def _picture(result: BeadResult) -> tuple[bytes, Picture]:
     return data, picture
 
 
-def _figures(result: BeadResult) -> list[Figure]:
+def _figures(result: BeadResult, other: str) -> list[Figure]:
     m, even = result.measurement, result.uniformity
     unit = m.unit
     why = "" if m.trusted else f"low confidence ({m.confidence:.2f})"
     if even is None:
         reason = "fewer than three stations could be measured"
         return [Figure(name=f"width_mean_{unit}", label="Mean width", value=None, reason=reason)]
+    aside = result.by_other_toe
+    unsure = "" if aside else "could not be told by this toe"
     span = even.peak_to_peak_25mm
     no_span = "needs a calibration and 25 mm of bead"
     return [
@@ -186,6 +207,9 @@ def _figures(result: BeadResult) -> list[Figure]:
         Figure(name="flagged", label="Flagged stations", value=int((~m.good).sum()), unit="1"),
         Figure(name="confidence", label="Confidence, 0 to 1", value=m.confidence, unit="1"),
         Figure(name="toe_definition", label="Toe definition", value=m.toe_definition),
+        Figure(name=f"width_mean_{other}_toe_{unit}", label=f"Mean width by the {other} toe",
+               value=aside.mean if aside else None, u=aside.u_mean if aside else None,
+               unit=unit if aside else "", reason=unsure),
     ]  # fmt: skip
 
 

@@ -230,6 +230,10 @@ def _lines(document: dict[str, Any]) -> list[str]:
     )
     lines.append(f"  {document['stations']} stations, {document['flagged']} flagged")
     lines.append(f"  toes: {document['toe_definition']}")
+    other = document["mean_width_by_other_toe"]
+    if mean and other:
+        change = 100 * (other / mean - 1)
+        lines.append(f"  by the {document['other_toe']} toe: {other:.4g} {unit} ({change:+.1f} %)")
     if document["surface"].get("spatter_count") is not None:
         lines.append(f"  spatter: {document['surface']['spatter_count']} drops")
     lines += [

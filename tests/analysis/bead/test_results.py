@@ -145,6 +145,23 @@ def test_millimetres_need_a_calibration(small: tuple[PhotoSource, PhotoSource]) 
     assert not any("mm" in column for column in bare.part.tables)
 
 
+def test_the_other_definition_of_the_toe_is_told_beside(
+    small: tuple[PhotoSource, PhotoSource],
+) -> None:
+    metal, outer = (
+        assess_photos(small[:1], config=BeadConfig(toe=toe))[0] for toe in ("metal", "outer")
+    )
+    for one, other, name in ((metal, outer, "outer"), (outer, metal, "metal")):
+        document = one.summary()
+        assert document["other_toe"] == name
+        assert document["mean_width_by_other_toe"] == other.summary()["mean_width_mm"]
+        (beside,) = (f for f in one.part.figures if f.name == f"width_mean_{name}_toe_mm")
+        assert (beside.value, beside.u) == (
+            document["mean_width_by_other_toe"],
+            other.summary()["u_mean_width"],
+        )
+
+
 def test_a_known_scale_is_enough_for_millimetres(small: tuple[PhotoSource, PhotoSource]) -> None:
     scale = ScaleCalibration(
         image_width_px=512, image_height_px=300, mm_per_px=0.1, scale_relative_u=0.04
