@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from seamlog.errors import EvidenceError
 
@@ -118,11 +118,11 @@ def _probability(square: float, free: int, error: float, free_error: int) -> flo
     """Of an interaction at least this large by chance (F test); None without interaction."""
     if free == 0 or error <= 0:
         return None
-    return float(stats.f.sf(square / free / error, free, free_error))
+    return float(special.fdtrc(free, free_error, square / free / error))
 
 
 def _interval(variance: float, free: int) -> tuple[float, float]:
     tail = (1 - CONFIDENCE) / 2
-    bounds = (free * variance / stats.chi2.ppf(part, free) for part in (1 - tail, tail))
+    bounds = (free * variance / special.chdtri(free, 1 - part) for part in (1 - tail, tail))
     low, high = (float(np.sqrt(bound)) for bound in bounds)
     return low, high

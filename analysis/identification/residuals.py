@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from .friction_models import FloatArray
 from .method import Identification
@@ -67,7 +67,7 @@ def analyse_residual(found: Identification) -> ResidualAnalysis:
     )
     return ResidualAnalysis(
         autocorrelation=alike,
-        whiteness_significance=float(stats.chi2.sf(statistic, lags)),
+        whiteness_significance=float(special.chdtrc(lags, statistic)),
         effective_rows=effective,
         by_position=_dependence(found.rows.position_m, centred, effective),
         by_speed=_dependence(found.rows.velocity_m_s, centred, effective),
@@ -96,5 +96,5 @@ def _dependence(along: FloatArray, residual: FloatArray, effective: float) -> De
         mean=mean,
         sd=np.sqrt(np.maximum(squares / counts - mean**2, 0.0)),
         share=max(0.0, (between - chance) / total),
-        significance=float(stats.f.sf(ratio, groups - 1, free)),
+        significance=float(special.fdtrc(groups - 1, free, ratio)),
     )

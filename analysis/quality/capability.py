@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 Floats = NDArray[np.float64]
 
@@ -47,14 +47,14 @@ def capability(
     sides = [] if upper is None else [(upper - mean) / (3 * std)]
     sides += [] if lower is None else [(mean - lower) / (3 * std)]
     cpk = min(sides)
-    z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
+    z = float(special.ndtri(0.5 + CONFIDENCE / 2))
     half = z * float(np.sqrt(1 / (9 * count) + cpk**2 / (2 * (count - 1))))
     cp = low = high = None
     if lower is not None and upper is not None:
         cp = (upper - lower) / (6 * std)
         tail = (1 - CONFIDENCE) / 2
         low, high = (
-            cp * float(np.sqrt(stats.chi2.ppf(part, count - 1) / (count - 1)))
+            cp * float(np.sqrt(special.chdtri(count - 1, 1 - part) / (count - 1)))
             for part in (tail, 1 - tail)
         )
     return Capability(cp, low, high, cpk, cpk - half, cpk + half, count)
