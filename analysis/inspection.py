@@ -42,9 +42,9 @@ def stitched(assessed: Sequence[AssessedPhoto], config: BeadConfig) -> AssessedP
     first = assessed[0].part
     part, tables, pictures = bead_part(whole, unique, config, len(assessed) + 1, first.weld)
     names = [assessed[k].name for k in found.order]
-    places = zip(names, found.first_station, found.shift_mm, strict=True)
+    places = zip(names, found.first_station, found.shift, strict=True)
     part.details["stitched"] = [
-        {"photo": name, "first_station": first_station, "s_mm": shift}
+        {"photo": name, "first_station": first_station, f"s_{found.measurement.unit}": shift}
         for name, first_station, shift in places
     ]
     return AssessedPhoto(part, tables, pictures, whole, None, found.photo.name)

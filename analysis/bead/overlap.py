@@ -13,7 +13,8 @@ _FEATURES = 4000
 _DISTINCT = 0.75
 """Lowe (2004): the best likeness against the next best."""
 FEWEST_MATCHES = 15
-_REACH_PX = 3.0
+REACH_PX = 3.0
+"""How far marks may lie from where the others put them."""
 
 
 def match_photos(source: Photo, target: Photo) -> NDArray[np.float64] | None:
@@ -26,7 +27,7 @@ def match_photos(source: Photo, target: Photo) -> NDArray[np.float64] | None:
     if len(pairs) < FEWEST_MATCHES:
         return None
     seen = from_px[[m.queryIdx for m in pairs]], to_px[[m.trainIdx for m in pairs]]
-    matrix, agreed = cv2.findHomography(*seen, cv2.RANSAC, _REACH_PX)
+    matrix, agreed = cv2.findHomography(*seen, cv2.RANSAC, REACH_PX)
     if matrix is None or int(np.sum(agreed)) < max(FEWEST_MATCHES, 0.15 * len(pairs)):
         return None
     return np.asarray(matrix, dtype=np.float64)

@@ -19,7 +19,7 @@ from seamlog.errors import EvidenceError
 
 from .image import Photo, make_photo
 from .measurement import BeadMeasurement
-from .overlap import match_photos
+from .overlap import REACH_PX, match_photos
 
 Floats = NDArray[np.float64]
 
@@ -35,28 +35,32 @@ _TILE_PX = 2000
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
-    """`s` of the second photo + `shift_mm` = `s` of the first; `backwards` if it runs against it.
+    """`s` of the second photo x `scale` + `shift` = `s` of the first; lengths in the first's unit.
 
-    `method` says what told it.
+    `backwards` if the second runs against the first; `method` says what told it. `scale` has the
+    standard uncertainty `u_scale`; millimetres need none of both.
     """
 
-    shift_mm: float
+    shift: float
     backwards: bool
     method: str
+    scale: float = 1.0
+    u_scale: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Stitched:
     """One measurement out of several photos, in px of `photo`, where they stand side by side.
 
-    `first_station` and `shift_mm` are those of each photo of `order` (indices as given).
+    `first_station` and `shift`, in the measurement's unit, are those of each photo of `order`
+    (indices as given).
     """
 
     measurement: BeadMeasurement
     photo: Photo
     order: tuple[int, ...]
     first_station: tuple[int, ...]
-    shift_mm: tuple[float, ...]
+    shift: tuple[float, ...]
 
 
 def backwards(m: BeadMeasurement) -> BeadMeasurement:
@@ -83,10 +87,15 @@ def find_overlap(
     first: BeadMeasurement, second: BeadMeasurement, photos: tuple[Photo, Photo]
 ) -> Overlap:
     """How two photos of one bead overlap; `EvidenceError` where that cannot be told."""
-    if first.unit != "mm" or second.unit != "mm":
-        raise EvidenceError("photos without calibration have no common scale to be stitched in")
+    if first.unit != second.unit:
+        raise EvidenceError("one has a calibration, the other has none: there is no common scale")
     matrix = match_photos(photos[1], photos[0])
     seen = _by_marks(first, second, matrix) if matrix is not None else None
+    if seen is None and first.unit == "px":
+        raise EvidenceError(
+            "without calibration only marks that both photos show tell how they overlap, and there "
+            "are too few; let the photos overlap by several bead widths, or calibrate"
+        )
     return seen or _by_width(first, second)
 
 
@@ -101,12 +110,17 @@ def _by_marks(
     on = inside & (away < 0.25 * width_px)
     if on.sum() < _FEWEST_STATIONS or on.sum() < 0.5 * inside.sum():
         return None
-    rising = np.polyfit(second.s[on], first.s[nearest[on]], 1)[0]
-    if abs(abs(rising) - 1) > _SCALE_APART:
+    rising = float(np.polyfit(second.s[on], first.s[nearest[on]], 1)[0])
+    scale, u_scale = 1.0, 0.0
+    if first.unit == "px":
+        # Marks agree within REACH_PX, and the stretch of bead between them tells the scale.
+        scale, u_scale = abs(rising), REACH_PX / np.sqrt(3) / float(np.ptp(first.s[nearest[on]]))
+    elif abs(abs(rising) - 1) > _SCALE_APART:
         return None
-    turned = bool(rising < 0)
-    own = second.s[-1] - second.s if turned else second.s
-    return Overlap(float(np.median(first.s[nearest[on]] - own[on])), turned, "marks on both photos")
+    turned = rising < 0
+    own = scale * (second.s[-1] - second.s if turned else second.s)
+    shift = float(np.median(first.s[nearest[on]] - own[on]))
+    return Overlap(shift, turned, "marks on both photos", scale, u_scale)
 
 
 def _by_width(first: BeadMeasurement, second: BeadMeasurement) -> Overlap:
@@ -203,8 +217,9 @@ def stitch(photos: Sequence[Photo], measured: Sequence[BeadMeasurement]) -> Stit
             overlap = find_overlap(turned[-1], following, pair)
         except EvidenceError as error:
             raise EvidenceError(f"photos {number - 1} and {number}: {error}") from error
-        turned.append(backwards(following) if overlap.backwards else following)
-        shifts.append(shifts[-1] + overlap.shift_mm)
+        scaled = _scaled(following, overlap.scale, overlap.u_scale)
+        turned.append(backwards(scaled) if overlap.backwards else scaled)
+        shifts.append(shifts[-1] + overlap.shift)
     order = sorted(range(len(turned)), key=lambda k: (shifts[k], shifts[k] + turned[k].s[-1]))
     zero = shifts[order[0]]
     spans = [(shifts[k] - zero, shifts[k] - zero + float(turned[k].s[-1])) for k in order]
@@ -221,6 +236,18 @@ def stitch(photos: Sequence[Photo], measured: Sequence[BeadMeasurement]) -> Stit
         tuple(order),
         tuple(int(first) for first in firsts),
         tuple(span[0] for span in spans),
+    )
+
+
+def _scaled(m: BeadMeasurement, scale: float, u_scale: float) -> BeadMeasurement:
+    """The measurement in a unit of which its own is `scale`."""
+    return replace(
+        m,
+        s=scale * m.s,
+        width=scale * m.width,
+        u_width=np.hypot(scale * m.u_width, u_scale * m.width),
+        u_noise=scale * m.u_noise,
+        unit_per_px=scale * m.unit_per_px,
     )
 
 

@@ -125,7 +125,7 @@ def _laid(
     if measured[0].unit != "mm":
         return measured[k], 0.0
     overlap = find_overlap(measured[0], measured[k], (photos[0], photos[k]))
-    return (backwards(measured[k]) if overlap.backwards else measured[k]), overlap.shift_mm
+    return (backwards(measured[k]) if overlap.backwards else measured[k]), overlap.shift
 
 
 def _means(m: BeadMeasurement, s: Floats, edges: Floats) -> Floats:

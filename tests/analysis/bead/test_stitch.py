@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -60,8 +61,30 @@ def test_photos_that_share_nothing_are_not_stitched(bead: SyntheticBead) -> None
     (first, left), (second, right) = crop(bead, 0, 0), crop(bead, 1050, 1)
     with pytest.raises(EvidenceError, match="photos 1 and 2"):
         stitch((first, second), (left, right))
-    with pytest.raises(EvidenceError, match="without calibration"):
+    with pytest.raises(EvidenceError, match="no common scale"):
         stitch((first, second), (replace(left, unit="px"), right))
+    bare = [replace(each, unit="px") for each in (left, right)]
+    with pytest.raises(EvidenceError, match="only marks that both photos show"):
+        stitch((first, second), bare)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_photos_without_calibration_get_the_scale_of_the_first(
+    bead: SyntheticBead, turned: bool
+) -> None:
+    first, far = crop(bead, 0, 0)[0], crop(bead, 500, 1)[0]
+    pixels = cv2.resize(far.pixels, None, fx=0.8, fy=0.8, interpolation=cv2.INTER_AREA)
+    second = make_photo(np.ascontiguousarray(np.rot90(pixels, 2 if turned else 0)), "far.png")
+    left, right = (measure_strip(photo, plane_of(photo, None)) for photo in (first, second))
+    m = stitch((first, second), (left, right)).measurement
+    assert m.unit == "px"
+    assert np.ptp(m.s) == pytest.approx(1400, abs=30)
+    start = bead.seam_s_mm(bead.calibration.plane_mm(left.centre_px[:1]))[0]
+    true_px = bead.width_at_mm(start + 0.1 * m.s) / 0.1
+    error = (m.width - true_px)[m.good]
+    assert (np.abs(error) < 3 * m.u_width[m.good]).mean() > 0.95
+    assert np.median(m.u_width[-200:]) > np.median(m.u_width[:200]), "the scale of the second photo is less sure"
+    assert np.sqrt(np.mean(error**2)) < 1.0
 
 
 def test_backwards_twice_is_the_same(bead: SyntheticBead) -> None:
