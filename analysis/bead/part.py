@@ -187,11 +187,9 @@ def _figures(result: BeadResult, other: str) -> list[Figure]:
     if even is None:
         reason = "fewer than three stations could be measured"
         return [Figure(name=f"width_mean_{unit}", label="Mean width", value=None, reason=reason)]
-    aside = result.by_other_toe
-    unsure = "" if aside else "could not be told by this toe"
     span = even.peak_to_peak_25mm
     no_span = "needs a calibration and 25 mm of bead"
-    return [
+    figures = [
         Figure(name=f"width_mean_{unit}", label="Mean width", value=even.mean, unit=unit,
                u=even.u_mean, reason=why),
         Figure(name=f"width_std_{unit}", label="Standard deviation of the width, noise taken out",
@@ -207,10 +205,13 @@ def _figures(result: BeadResult, other: str) -> list[Figure]:
         Figure(name="flagged", label="Flagged stations", value=int((~m.good).sum()), unit="1"),
         Figure(name="confidence", label="Confidence, 0 to 1", value=m.confidence, unit="1"),
         Figure(name="toe_definition", label="Toe definition", value=m.toe_definition),
-        Figure(name=f"width_mean_{other}_toe_{unit}", label=f"Mean width by the {other} toe",
-               value=aside.mean if aside else None, u=aside.u_mean if aside else None,
-               unit=unit if aside else "", reason=unsure),
     ]  # fmt: skip
+    name, label = f"width_mean_{other}_toe_{unit}", f"Mean width by the {other} toe"
+    if aside := result.by_other_toe:
+        figures.append(Figure(name=name, label=label, value=aside.mean, unit=unit, u=aside.u_mean))
+    elif result.plane is not None:
+        figures.append(Figure(name=name, label=label, value=None, reason="no width to trust"))
+    return figures
 
 
 def _criteria(result: BeadResult, config: BeadConfig) -> list[Criterion]:
