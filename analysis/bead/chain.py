@@ -1,5 +1,7 @@
 """Dynamic programming: the smooth chain of columns, one per row, that gathers the most evidence."""
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,15 +18,15 @@ def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int6
     """As `best_chain` for several scores (n, rows, columns) at once, shape (n, rows)."""
     count, rows, columns = score.shape
     values = np.full((rows, count, columns + 2), -np.inf, dtype=np.float32)
-    values[0, :, 1:-1] = score[:, 0]
+    values[:, :, 1:-1] = np.swapaxes(score, 0, 1)
     cost = np.float32(move_cost)
-    moved = np.empty((count, columns), dtype=np.float32)
-    for row in range(1, rows):
-        before, now = values[row - 1], values[row, :, 1:-1]
-        np.maximum(before[:, :-2], before[:, 2:], out=moved)
-        moved -= cost
-        np.maximum(moved, before[:, 1:-1], out=now)
-        now += score[:, row]
+    flat = values.reshape(rows, -1)
+    best = np.empty_like(flat[0, 1:-1])
+    for before, now in itertools.pairwise(flat):
+        np.maximum(before[:-2], before[2:], out=best)
+        np.subtract(best, cost, out=best)
+        np.maximum(best, before[1:-1], out=best)
+        now[1:-1] += best
     return _walked_back(values, cost)
 
 
@@ -34,10 +36,11 @@ def _walked_back(values: NDArray[np.float32], cost: np.float32) -> NDArray[np.in
     same, less, more = before[..., 1:-1], before[..., :-2] - cost, before[..., 2:] - cost
     came = (more > np.maximum(same, less)).astype(np.int8)
     came -= (less > same) & (less >= more)
+    moves = memoryview(came)
     path = np.empty((values.shape[1], len(values)), dtype=np.int64)
-    for chain, last in enumerate(np.argmax(values[-1, :, 1:-1], axis=1).tolist()):
-        path[chain, -1] = column = last
+    for chain, column in enumerate(np.argmax(values[-1, :, 1:-1], axis=1).tolist()):
+        columns = [column]
         for row in range(len(came) - 1, -1, -1):
-            column += int(came[row, chain, column])
-            path[chain, row] = column
+            columns.append(columns[-1] + moves[row, chain, columns[-1]])
+        path[chain] = columns[::-1]
     return path

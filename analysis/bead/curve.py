@@ -70,6 +70,6 @@ def _spline(path: Points, length: Floats, knot_spacing: float) -> BSpline:
         length = np.linspace(0, length[-1], 16)
     degree = _DEGREE if len(path) >= _ENOUGH else 3
     inner = max(0, min(int(length[-1] / knot_spacing) - 1, len(path) // 6))
-    places = np.quantile(length, np.linspace(0.0, 1.0, inner + 2))
+    places = np.interp(np.linspace(0, len(path) - 1, inner + 2), np.arange(len(path)), length)
     knots = np.concatenate([[0.0] * degree, places, [length[-1]] * degree])
     return make_lsq_spline(length, path, knots, k=degree)

@@ -73,14 +73,27 @@ def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> 
         columns, rough.middle - _CORE * rough.half, rough.middle + _CORE * rough.half, valid
     )
     core = zone(columns, rough.middle - 0.7 * half, rough.middle + 0.7 * half, valid)
+    reach = freedom * half + 2
+    windows = _windows(columns, rough, reach)
     scores, present = [], np.full(len(rough.left), np.inf)
-    for side, edge in ((-1, rough.left), (1, rough.right)):
+    for side, edge, window in zip((-1, 1), (rough.left, rough.right), windows, strict=True):
         like = likeness(look.features, bead, _plate(columns, edge, side, half, beyond, valid))
-        scores.append(_score(like, look, edge, side, half, freedom))
+        like *= valid
+        near = np.abs(np.arange(window.start, window.stop) - edge[:, None]) <= reach
+        scores.append(_score(like[:, window], look.edges[:, window], side, half, near))
         inside = np.where(core, like, 0).sum(axis=1) / np.maximum(core.sum(axis=1), 1)
         present = np.minimum(present, inside)
     left, right = best_chains(np.stack(scores), _MOVE).astype(np.float64)
-    return Extent(left, right, present)
+    return Extent(left + windows[0].start, right + windows[1].start, present)
+
+
+def _windows(columns: int, rough: Extent, reach: float) -> list[slice]:
+    """Columns within `reach` of the left and of the right edge, as many for both."""
+    edges = (rough.left, rough.right)
+    size = min(columns, int(max(np.ptp(edge) for edge in edges) + 2 * reach) + 2)
+    lowest = (int(np.floor(edge.min() - reach)) for edge in edges)
+    firsts = [min(max(first, 0), columns - size) for first in lowest]
+    return [slice(first, first + size) for first in firsts]
 
 
 def _plate(
@@ -112,18 +125,14 @@ def _edges(features: Features) -> NDArray[np.float32]:
 
 def _score(
     like: NDArray[np.float32],
-    look: StripLook,
-    rough: Floats,
+    edges: NDArray[np.float32],
     side: int,
     half: float,
-    freedom: float,
+    near: NDArray[np.bool_],
 ) -> NDArray[np.float32]:
     """How well a toe at each column splits bead-like from plate-like places and is sharp."""
-    columns = like.shape[1]
-    gathered = np.cumsum(np.where(look.valid, like, 0), axis=1)
-    region = side * gathered / max(4.0, 0.12 * half)
-    beyond = side * (np.arange(columns) - rough[:, None])
-    reach = freedom * half + 2
-    score = (region + _EDGE * look.edges).astype(np.float32)
-    score = np.where(np.abs(beyond) <= reach, score, np.float32(-1e6))
+    score = np.cumsum(like, axis=1)
+    score *= np.float32(side / max(4.0, 0.12 * half))
+    score += np.float32(_EDGE) * edges
+    score = np.where(near, score, np.float32(-1e6))
     return np.asarray(score - score.max(axis=1, keepdims=True))

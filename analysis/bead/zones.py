@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter1d
 
 from .features import Features
 
@@ -15,7 +15,8 @@ _TEXTURE = 0.3
 """Weight of the texture's evidence against that of the colours."""
 _SPAN, _BINS = 16, 24
 """Bins between the 1st and the 99th percentile of a channel, and all of them."""
-_SMOOTH = 2.0
+_SMOOTHING = gaussian_filter1d(np.eye(_BINS), 2.0, axis=0)
+"""Matrix that smooths a histogram; applied and turned once per channel it does so in all."""
 _RARE = 1e-4
 """Share that any look has in any zone."""
 
@@ -40,7 +41,7 @@ def look_of(samples: Features) -> Look:
 
 def zone(columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mask of columns in [start, stop) per row, where the photo has samples."""
-    at = np.arange(columns)
+    at = np.arange(float(columns))
     return (at >= start[:, None]) & (at < stop[:, None]) & valid
 
 
@@ -52,28 +53,38 @@ def likeness(
     Colours are counted together, in a smoothed histogram, since a bead has many: metal, slag,
     glare. Texture is counted by itself and weighs less. Clipped, so that no place decides alone.
     """
-    colour = _log_ratio(features[..., :-1], inside, outside)
-    texture = _log_ratio(features[..., -1:], inside, outside)
-    ratio = colour + np.float32(_TEXTURE) * texture
-    return np.asarray(np.clip(ratio, -_CLIP, _CLIP), dtype=np.float32)
+    planes = np.ascontiguousarray(features.reshape(inside.size, -1).T)
+    zones = np.flatnonzero(inside), np.flatnonzero(outside)
+    ratio = _log_ratio(planes[:-1], *zones)
+    ratio += np.float32(_TEXTURE) * _log_ratio(planes[-1:], *zones)
+    return np.clip(ratio, -_CLIP, _CLIP, out=ratio).reshape(inside.shape)
 
 
 def _log_ratio(
-    features: Features, inside: NDArray[np.bool_], outside: NDArray[np.bool_]
+    planes: NDArray[np.float32], inside: NDArray[np.int64], outside: NDArray[np.int64]
 ) -> NDArray[np.float32]:
-    low, high = np.percentile(features[inside | outside], (1, 99), axis=0)
-    width = np.maximum((high - low) / _SPAN, 1e-3).astype(np.float32)
-    margin = (_BINS - _SPAN) // 2
-    bins = np.clip((features - low.astype(np.float32)) / width + margin, 0, _BINS - 1)
-    places = bins.astype(np.int32) @ (_BINS ** np.arange(features.shape[-1])).astype(np.int32)
-    shape = (_BINS,) * features.shape[-1]
-    shares = []
-    for zone_ in (inside, outside):
-        counted = np.bincount(places[zone_], minlength=_BINS ** len(shape)).reshape(shape)
-        smooth = gaussian_filter(counted.astype(np.float32), _SMOOTH)
-        shares.append(smooth / max(float(smooth.sum()), 1e-6) + _RARE)
-    ratio = np.log(shares[0] / shares[1]).ravel().astype(np.float32)
-    return np.asarray(ratio[places])
+    """Of the channels `planes` (k, places) together, by the places of both zones."""
+    both = np.concatenate([inside, outside])
+    places = np.zeros(planes.shape[1], dtype=np.int64)
+    for plane in planes:
+        places = places * _BINS + _bins(plane, *np.percentile(plane[both], (1, 99)))
+    a, b = (_shares(places[zone_], len(planes)) for zone_ in (inside, outside))
+    return np.asarray(np.log(a / b).astype(np.float32)[places])
+
+
+def _bins(plane: NDArray[np.float32], low: float, high: float) -> NDArray[np.int64]:
+    bins = plane - np.float32(low)
+    bins /= np.float32(max((high - low) / _SPAN, 1e-3))
+    bins += np.float32((_BINS - _SPAN) // 2)
+    return np.clip(bins, 0, _BINS - 1, out=bins).astype(np.int64)
+
+
+def _shares(places: NDArray[np.int64], channels: int) -> Floats:
+    """How often each bin of a smoothed histogram occurs, flat."""
+    counted = np.bincount(places, minlength=_BINS**channels).astype(np.float64)
+    for _ in range(channels):
+        counted = (_SMOOTHING @ counted.reshape(_BINS, -1)).T
+    return np.asarray(counted.ravel() / max(len(places), 1e-6) + _RARE)
 
 
 def fisher_direction(inside: Features, outside: Features) -> tuple[Floats, float]:
