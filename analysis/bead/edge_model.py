@@ -4,6 +4,7 @@ Shading and lines beside a toe vary slowly along it, so they are fitted on means
 leave a plain step to each row, which is the least noisy thing to place.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,21 +12,21 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from .edge_shapes import (
-    COARSE,
     MODELS,
     Floats,
+    Profiles,
     Projected,
     Window,
     basis,
-    energy,
-    fit,
+    even_ruler,
     level_weighted,
     parameters,
     peak,
     resolved,
-    shifts_within,
     subspaces,
 )
+
+Rows = NDArray[np.int64]
 
 _BLURS_PX = tuple(float(blur) for blur in np.geomspace(0.6, 5.0, 20))
 _ROW_BLURS_PX = _BLURS_PX[1::2]
@@ -43,9 +44,12 @@ _LIKELY = 0.2
 """Evidence, of the best model's, that a model must have to be chosen."""
 _ALIKE_PX = 0.05
 """Difference in place up to which the simpler model is taken."""
+_ROWS = 512
+"""Rows from which a toe's model is made at most."""
 _BLOCKS = 16
 _TRUST = 0.25
 """Part of what a richer model moves an edge by that stays in doubt."""
+_GOLDEN = (np.sqrt(5) - 1) / 2
 _CALM = 5.0
 """Rows over which single rows' places are averaged to align profiles."""
 
@@ -54,69 +58,66 @@ _CALM = 5.0
 class EdgeModel:
     """What was chosen for a toe: model, blur, the doubt between models, and what is not step.
 
-    `shading` (blocks, window) are ramps and lines beside the step at equal stretches of the toe,
-    in profiles that are aligned as `alignment` does.
+    `shading` (rows, window) are ramps and lines beside the step in each row's profile.
     """
 
     window: Window
     name: str
     blur: float
     u: float
-    shading: Floats
+    shading: Profiles
 
 
-def profiles_at(signal: NDArray[np.float32], centre: NDArray[np.int64], window: Window) -> Floats:
-    """Profiles (rows, window) around a column per row of a signal with the bead to the right."""
+def profiles_at(signal: Projected, centre: Rows, window: Window) -> Projected:
+    """Profiles (..., rows, window) around a column of each row, the bead to the right."""
     columns = centre[:, None] + window.columns.astype(np.int64)
-    rows = np.arange(len(signal))[:, None]
-    return np.asarray(signal[rows, np.clip(columns, 0, signal.shape[1] - 1)], dtype=np.float64)
+    rows = np.arange(len(centre))[:, None]
+    return signal[..., rows, np.clip(columns, 0, signal.shape[-1] - 1)]
 
 
-def choose_model(
-    signal: NDArray[np.float32], centre: NDArray[np.int64], window: Window
-) -> EdgeModel:
+def choose_model(signal: Projected, centre: Rows, window: Window) -> EdgeModel:
     """The model for a toe: on mean profiles of blocks of rows, aligned by a first plain fit.
 
     Where there is shading or a line beside the step, a narrower window keeps what is farther
     away out of it.
     """
-    means = _means(signal, centre, window)
+    shift, means = _aligned(signal, centre, window)
     model, doubt = _chosen(means, window)
     near = window.around(model.blur)
     if model.name != "step" and near != window:
-        window, means = near, _means(signal, centre, near)
+        window = near
+        shift, means = _aligned(signal, centre, window)
         model, doubt = _chosen(means, window)
-    return EdgeModel(window, model.name, model.blur, doubt, _shading(means, window, model))
+    shading = _along(_shading(means, window, model), shift)
+    return EdgeModel(window, model.name, model.blur, doubt, shading)
 
 
-def _means(signal: NDArray[np.float32], centre: NDArray[np.int64], window: Window) -> Floats:
+def spread(count: int, most: int) -> Rows:
+    """Some of `count` rows, spread unevenly: a ripple must not keep step with them."""
+    if count <= most:
+        return np.arange(count)
+    at = np.arange(most)
+    return np.asarray((at + at * _GOLDEN % 1.0) * count / most, dtype=np.int64)
+
+
+def _aligned(signal: Projected, centre: Rows, window: Window) -> tuple[Floats, Floats]:
+    """Shift of each row's edge by a plain fit, calmed along the toe, and mean profiles."""
     profiles = profiles_at(signal, centre, window)
-    return aligned_means(profiles, alignment(profiles, centre, window))
+    first = even_ruler(window, 1.5, 2.5).places(profiles).shift
+    shift = gaussian_filter1d(first + centre, _CALM, mode="nearest") - centre
+    rows = spread(len(centre), _ROWS)
+    return shift, aligned_means(profiles[rows], shift[rows])
 
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
-    """A model at its best blur: log misfit with the price of its parameters, and its place."""
+    """A model at its best blur: log misfit with the price of its parameters, place, step."""
 
     name: str
     blur: float
     score: float
     place: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Weighed:
-    """Mean profiles, weighted, the energy of each, and the least misfit that any may have."""
-
-    profiles: Projected
-    whole: Projected
-    floor: float
-
-    @classmethod
-    def of(cls, means: Floats, window: Window) -> "_Weighed":
-        weighted = level_weighted(means, window)
-        floor = GREY_FLOOR + (EDGE_FLOOR * float(np.median(np.ptp(means, axis=1)))) ** 2
-        return cls(weighted, np.einsum("rn,rn->r", weighted, weighted), floor)
+    step: float
 
 
 def _chosen(means: Floats, window: Window) -> tuple[_Candidate, float]:
@@ -138,16 +139,13 @@ def _candidates(means: Floats, window: Window) -> list[_Candidate]:
 
     Those that are far less likely than the best are left out.
     """
-    seen = _Weighed.of(means, window)
-    plain = _candidate(seen, window, "step")
-    least = _CARRIES * _step(means, window, plain)
-    names = [name for name in MODELS if name != plain.name and resolved(name, plain.blur)]
-    richer = sorted((_candidate(seen, window, name) for name in names), key=_by_score)
+    plain, *richer = _tried(means, window)
+    far = _FAR * _price(window)
     kept = [plain]
-    for one in richer:
-        if one.score > min(kept, key=_by_score).score + _FAR * _price(window):
+    for one in sorted((one for one in richer if resolved(one.name, plain.blur)), key=_by_score):
+        if one.score > min(kept, key=_by_score).score + far:
             break
-        if _step(means, window, one) > least:
+        if one.step > _CARRIES * plain.step:
             kept.append(one)
     return kept
 
@@ -156,23 +154,9 @@ def _by_score(candidate: _Candidate) -> float:
     return candidate.score
 
 
-def _step(means: Floats, window: Window, candidate: _Candidate) -> float:
-    """Height of a model's step in the mean of all profiles."""
-    parts = basis(window.columns - candidate.place, candidate.name, candidate.blur)
-    weight = window.weight
-    found = np.linalg.lstsq(parts * weight[:, None], means.mean(axis=0) * weight, rcond=None)
-    return float(found[0][1])
-
-
 def _price(window: Window) -> float:
     """How much lower (log) the misfit must be for each further parameter (Schwarz 1978)."""
     return float(np.log(window.size)) / window.size
-
-
-def alignment(profiles: Floats, centre: NDArray[np.int64], window: Window) -> Floats:
-    """Shift of each row's edge by a plain fit, calmed along the toe."""
-    first = fit(profiles, window, "step", 1.5, 2.5).shift
-    return np.asarray(gaussian_filter1d(first + centre, _CALM, mode="nearest") - centre)
 
 
 def _shading(means: Floats, window: Window, model: _Candidate) -> Floats:
@@ -189,54 +173,76 @@ def _shading(means: Floats, window: Window, model: _Candidate) -> Floats:
     return np.asarray(gaussian_filter1d(shading, 1.0, axis=0, mode="nearest"))
 
 
-def aligned_means(profiles: Floats, shift: Floats) -> Floats:
+def _along(shading: Floats, shift: Floats) -> Profiles:
+    """Shading of blocks of rows in each row's profile: between that of the blocks next to it."""
+    rows, blocks = len(shift), len(shading)
+    at = np.clip(np.linspace(0, blocks, rows) - 0.5, 0, blocks - 1)
+    low = np.minimum(at.astype(np.int64), max(blocks - 2, 0))
+    part = (at - low)[:, None]
+    before = moved(shading, low, -shift)
+    behind = moved(shading, np.minimum(low + 1, blocks - 1), -shift)
+    return np.asarray(before + part * (behind - before), dtype=np.float32)
+
+
+def aligned_means(profiles: Profiles, shift: Floats) -> Floats:
     """Means of blocks of rows, each row moved by its shift."""
-    blocks = np.array_split(np.arange(len(profiles)), min(_BLOCKS, max(1, len(profiles) // 4)))
+    count = min(_BLOCKS, max(1, len(profiles) // 4))
+    size, more = divmod(len(profiles), count)
+    lengths = size + (np.arange(count) < more)
     straight = moved(profiles, np.arange(len(profiles)), shift)
-    return np.array([straight[block].mean(axis=0) for block in blocks])
+    sums = np.add.reduceat(straight, np.cumsum(lengths) - lengths)
+    return np.asarray(sums / lengths[:, None])
 
 
-def moved(profiles: Floats, rows: NDArray[np.int64], shift: Floats) -> Floats:
+def moved(profiles: Profiles, rows: Rows, shift: Floats) -> Profiles:
     """Profiles of some rows read `shift` columns further on (linear interpolation)."""
-    last = profiles.shape[1] - 1
-    columns = np.clip(np.arange(last + 1) + shift[:, None], 0, last)
-    left = np.minimum(columns.astype(np.int64), last - 1)
-    part = columns - left
-    at = rows[:, None]
-    return np.asarray((1 - part) * profiles[at, left] + part * profiles[at, left + 1])
+    count = profiles.shape[1]
+    whole = np.floor(shift)
+    columns = np.arange(count) + whole.astype(np.int64)[:, None]
+    first = (rows * count)[:, None]
+    low = profiles.take(first + np.clip(columns, 0, count - 1))
+    high = profiles.take(first + np.clip(columns + 1, 0, count - 1))
+    return np.asarray(low + (shift - whole).astype(profiles.dtype)[:, None] * (high - low))
 
 
-def _candidate(means: _Weighed, window: Window, model: str) -> _Candidate:
-    """A model at the blur, between those that are tried, where its misfit is least."""
-    shifts = shifts_within(1.5, COARSE)
-    bases = subspaces(window, model, _BLURS_PX, 1.5, COARSE)
-    captured = energy((means.profiles @ bases).reshape(len(means.whole), parameters(model), -1))
-    captured = captured.reshape(len(means.whole), len(_BLURS_PX), len(shifts))
-    freedom = max(window.size - parameters(model) - 1, 1.0)
-    misfit = np.median(means.whole[:, None] - captured.max(axis=2), axis=0) / freedom
-    logs = np.log(np.maximum(misfit, 0) + means.floor)
-    at = int(np.clip(np.argmin(logs), 1, len(logs) - 2))
-    a, b, c = logs[at - 1 : at + 2]
-    move = float(np.clip(0.5 * (a - c) / max(a - 2 * b + c, 1e-9), -1, 1))
-    blur = round(float(_BLURS_PX[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move), 2)
-    price = _price(window) * (parameters(model) - 2)
-    places, _, _ = peak(captured[:, int(np.argmin(logs))], shifts)
-    score = float(b - 0.25 * (a - c) * move) + price
-    return _Candidate(model, blur, score, float(np.median(places)))
+def _tried(means: Floats, window: Window) -> list[_Candidate]:
+    """Each model at the blur, between those that are tried, where its misfit is least."""
+    weighted, models = level_weighted(means, window), tuple(MODELS)
+    space = subspaces(window, models, _BLURS_PX, 1.5)
+    captured = space.energies(weighted)
+    floor = GREY_FLOOR + (EDGE_FLOOR * float(np.median(np.ptp(means, axis=1)))) ** 2
+    logs = _log_misfits(weighted, window, models, captured, floor)
+    each, best = np.arange(len(models)), np.argmin(logs, axis=1)
+    at = np.clip(best, 1, len(_BLURS_PX) - 2)
+    a, b, c = (logs[each, at + k] for k in (-1, 0, 1))
+    move = np.clip(0.5 * (a - c) / np.maximum(a - 2 * b + c, 1e-9), -1, 1)
+    blurs = np.array(_BLURS_PX)[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move
+    scores = b - 0.25 * (a - c) * move
+    places = np.median(peak(captured[each, :, best].swapaxes(1, 2), space.shifts)[0], axis=1)
+    nearest = np.searchsorted(space.shifts[:-1] + space.shifts[1:], 2 * places)
+    steps = space.heights[each, nearest, best] @ weighted.mean(axis=0)
+    found = zip(models, *np.array([blurs.round(2), scores, places, steps]).tolist(), strict=True)
+    return [_Candidate(*one) for one in found]
 
 
-def typical_blur(profiles: Floats, window: Window) -> float:
+def _log_misfits(
+    weighted: Projected,
+    window: Window,
+    models: Sequence[str],
+    captured: Projected,
+    floor: float,
+) -> Floats:
+    """Log of the typical misfit with the price of the parameters, (models, blurs)."""
+    count = np.array([[parameters(model)] for model in models])
+    whole = np.einsum("rn,rn->r", weighted, weighted)
+    left = np.median(whole - captured.max(axis=1), axis=-1)
+    misfit = np.maximum(left / np.maximum(window.size - count - 1, 1.0), 0)
+    return np.asarray(np.log(misfit + floor) + _price(window) * (count - 2))
+
+
+def typical_blur(profiles: Profiles, window: Window) -> float:
     """Blur that fits single rows best: where a toe is ragged, their mean is softer than they."""
     weighted = level_weighted(profiles, window)
-    whole = (weighted**2).sum(axis=1, keepdims=True)
-    scores = []
-    for model in _SINGLE_ROWS:
-        bases = subspaces(window, model, _ROW_BLURS_PX, 2.5, COARSE)
-        captured = energy((weighted @ bases).reshape(len(profiles), parameters(model), -1))
-        most = captured.reshape(len(profiles), len(_ROW_BLURS_PX), -1).max(axis=2)
-        freedom = max(window.size - parameters(model) - 1, 1.0)
-        misfit = np.median(whole - most, axis=0) / freedom
-        price = _price(window) * (parameters(model) - 2)
-        logs = np.log(np.maximum(misfit, 0) + GREY_FLOOR) + price
-        scores += list(zip(logs.tolist(), _ROW_BLURS_PX, strict=True))
-    return min(scores)[1]
+    captured = subspaces(window, _SINGLE_ROWS, _ROW_BLURS_PX, 2.5).energies(weighted)
+    logs = _log_misfits(weighted, window, _SINGLE_ROWS, captured, GREY_FLOOR)
+    return _ROW_BLURS_PX[int(np.argmin(logs.min(axis=0)))]

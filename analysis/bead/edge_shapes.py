@@ -1,17 +1,19 @@
 """Profiles across a toe: a blurred step with shading and a dark line beside it, and their fit.
 
 For each shift of the edge a profile is projected on a small subspace; the shift that captures
-most of it wins.
+most of it wins. The level is part of every subspace, so it is taken out of profiles and bases once.
 """
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
 Floats = NDArray[np.float64]
+Profiles = NDArray[np.floating[Any]]
 Projected = NDArray[np.float32]
 """Profiles and bases to be multiplied: what a fit leaves is a ten-thousandth of them or more."""
 
@@ -25,14 +27,14 @@ MODELS: dict[str, tuple[str, ...]] = {
     "curves, line": ("ramps", "curves", "line"),
     "curves, broad line": ("ramps", "curves", "broad line"),
 }
-"""What lies beside the step, by name."""
+"""What lies beside the step, by name; each after the one that it adds its last part to."""
 _LINES_PX = {"line": 1.2, "broad line": 2.5}
 """Distance of a dark line from the edge, which is also its standard deviation."""
 _RESOLVED = 2.0
 """Blur, in distances of a line, up to which it can be told from a shift."""
-_PARAMETERS = {"line": 1, "broad line": 1, "ramps": 2, "curves": 2}
+_PARAMETERS = {"ramps": 2, "curves": 2, "line": 1, "broad line": 1}
 _STEP = 0.125
-COARSE = 0.25
+_COARSE = 0.25
 """Columns from one shift to the next in fits, and where only models are compared."""
 
 
@@ -93,16 +95,16 @@ def resolved(model: str, blur: float) -> bool:
     return all(blur <= _RESOLVED * _LINES_PX.get(part, np.inf) for part in MODELS[model])
 
 
-def step_at(z: Floats, blur: float) -> Floats:
+def step_at(z: Floats, blur: float | Floats) -> Floats:
     """A step of height 1 at z = 0, blurred by a Gaussian."""
     return np.asarray(0.5 * (1 + erf(z / (np.sqrt(2) * blur))))
 
 
-def basis(z: Floats, model: str, blur: float) -> Floats:
+def basis(z: Floats, model: str, blur: float | Floats) -> Floats:
     """The model's parts at distances z inside of the edge, (..., k): level, step and the rest."""
     step = step_at(z, blur)
     bell = np.exp(-0.5 * (z / blur) ** 2) / (np.sqrt(2 * np.pi) * blur)
-    parts = [np.ones_like(z), step]
+    parts = [np.ones_like(step), step]
     for part in MODELS[model]:
         if part in _LINES_PX:
             parts.append(_line(z, _LINES_PX[part], blur))
@@ -115,73 +117,124 @@ def basis(z: Floats, model: str, blur: float) -> Floats:
     return np.stack(parts, axis=-1)
 
 
-def _line(z: Floats, away: float, blur: float) -> Floats:
+def _line(z: Floats, away: float, blur: float | Floats) -> Floats:
     """A blurred Gaussian line on the plate, `away` from the edge and as broad, that ends there."""
     variance = away * away + blur * blur
     middle = (z * away * away - away * blur * blur) / variance
     spread = away * blur / np.sqrt(variance)
-    return np.exp(-0.5 * (z + away) ** 2 / variance) * (1 - step_at(middle, float(spread)))
+    return np.asarray(np.exp(-0.5 * (z + away) ** 2 / variance) * (1 - step_at(middle, spread)))
 
 
-def shifts_within(reach: float, step: float = _STEP) -> Floats:
-    """The shifts that are tried, in columns."""
+def _shifts_within(reach: float, step: float) -> Floats:
     return np.arange(-reach, reach + 1e-9, step)
+
+
+def level_weighted(profiles: Profiles, window: Window) -> Projected:
+    """Weighted profiles (rows, window) without their level."""
+    weight = window.weight
+    level = profiles @ (weight * weight) / window.size
+    return np.asarray((profiles - level[:, None]) * weight, dtype=np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class Subspaces:
+    """What models span at each shift and blur of a step, weighted by a window.
+
+    `added` (parts, shifts x blurs, window) are the orthonormal directions that the last part of
+    each model adds to those of the model without it, which must come before it. `heights`
+    (models, shifts, blurs, window) read the height of a model's step off a weighted profile.
+    """
+
+    models: tuple[str, ...]
+    shifts: Floats
+    blurs: tuple[float, ...]
+    added: Projected
+    heights: Floats
+
+    def energies(self, weighted: Projected) -> Projected:
+        """Energy of profiles without level that models capture, (models, shifts, blurs, rows)."""
+        squares = self.added.reshape(-1, self.added.shape[2]) @ weighted.T
+        squares = np.square(squares, out=squares).reshape(len(self.added), -1)
+        found = np.empty((len(self.models), squares.shape[1]), dtype=np.float32)
+        rows = {MODELS[model]: row for row, model in enumerate(self.models)}
+        first = 0
+        for model, own in zip(self.models, found, strict=True):
+            parts, last = MODELS[model], first + _added(model)
+            squares[first:last].sum(axis=0, out=own)
+            if parts:
+                own += found[rows[parts[:-1]]]
+            first = last
+        return found.reshape(len(found), len(self.shifts), len(self.blurs), -1)
 
 
 @cache
 def subspaces(
-    window: Window, model: str, blurs: tuple[float, ...], reach: float, step: float = _STEP
-) -> Projected:
-    """Orthonormal bases of the weighted profiles side by side.
+    window: Window, models: tuple[str, ...], blurs: tuple[float, ...], reach: float
+) -> Subspaces:
+    """The subspaces of models within `reach` columns."""
+    shifts = _shifts_within(reach, _COARSE)
+    at = window.columns - shifts[:, None, None]
+    added, heights = [], []
+    for model in models:
+        bases = basis(at, model, np.array(blurs)[:, None]) * window.weight[:, None]
+        directions, sizes = np.linalg.qr(bases)
+        last = np.moveaxis(directions[..., -_added(model) :], -1, 0)
+        added.append(last.reshape(len(last), -1, len(window.columns)))
+        heights.append(np.einsum("...nk,...k->...n", directions, np.linalg.inv(sizes)[..., 1, :]))
+    found = np.concatenate(added).astype(np.float32)
+    return Subspaces(models, shifts, blurs, found, np.array(heights))
 
-    Shape (window, k x blurs x shifts), the last index fastest.
+
+def _added(model: str) -> int:
+    """How many parameters a model's last part adds."""
+    return _PARAMETERS[MODELS[model][-1]] if MODELS[model] else 1
+
+
+@dataclass(frozen=True, slots=True)
+class Ruler:
+    """What measures the shift of a step in profiles with noise.
+
+    `white` (window, window) evens the noise and takes the level out, `steps` (window, shifts)
+    are the unit directions of a step in what it leaves.
     """
-    at = window.columns - shifts_within(reach, step)[:, None]
-    stacked = np.concatenate([basis(at, model, blur) for blur in blurs])
-    return side_by_side(stacked * window.weight[None, :, None])
+
+    white: Projected
+    steps: Projected
+    shifts: Floats
+
+    @classmethod
+    def of(cls, white: Floats, window: Window, blur: float, reach: float) -> "Ruler":
+        """A ruler for steps with a blur within `reach` columns, by what evens the noise."""
+        level = white.sum(axis=1)
+        white = white - np.outer(level, level @ white) / (level @ level)
+        shifts = _shifts_within(reach, _STEP)
+        steps = white @ step_at(window.columns[:, None] - shifts, blur)
+        steps /= np.linalg.norm(steps, axis=0)
+        return cls(white.T.astype(np.float32), steps.astype(np.float32), shifts)
+
+    def places(self, profiles: Profiles) -> Fit:
+        """The best shift of each profile (..., rows, window), by captured energy.
+
+        A step that falls towards the bead captures nothing.
+        """
+        weighted = profiles @ self.white
+        energy = np.square(np.maximum(weighted @ self.steps, 0))
+        places, most, curvature = peak(energy, self.shifts)
+        misfit = np.maximum(np.einsum("...n,...n->...", weighted, weighted) - most, 1e-9)
+        return Fit(places, misfit, _STEP**2 / (-0.5 * curvature))
 
 
-def side_by_side(stacked: Floats) -> Projected:
-    """Orthonormal bases of a stack (n, window, k), as (window, k x n), each in its own sense."""
-    bases, sizes = np.linalg.qr(stacked)
-    bases = bases * np.sign(np.diagonal(sizes, axis1=1, axis2=2))[:, None, :]
-    return np.asarray(bases.transpose(1, 2, 0).reshape(stacked.shape[1], -1), dtype=np.float32)
+@cache
+def even_ruler(window: Window, blur: float, reach: float) -> Ruler:
+    """A ruler for profiles whose columns are equally noisy, weighted by the window."""
+    return Ruler.of(np.diag(window.weight), window, blur, reach)
 
 
-def fit(profiles: Floats, window: Window, model: str, blur: float, reach: float) -> Fit:
-    """The best shift of each profile within `reach` columns, by captured energy."""
-    weighted = level_weighted(profiles, window)
-    return best_shifts(weighted, subspaces(window, model, (blur,), reach), shifts_within(reach))
-
-
-def level_weighted(profiles: Floats, window: Window) -> Projected:
-    """Profiles without their mean, weighted; every model has a level."""
-    level = profiles.mean(axis=1, keepdims=True)
-    return np.asarray((profiles - level) * window.weight, dtype=np.float32)
-
-
-def best_shifts(weighted: Projected, bases: Projected, shifts: Floats) -> Fit:
-    """The shift at which the bases (window, k x shifts) capture most of each weighted profile.
-
-    A step that falls towards the bead captures nothing.
-    """
-    projected = (weighted @ bases).reshape(len(weighted), -1, len(shifts))
-    captured = energy(projected)
-    captured[projected[:, 1] <= 0] = 0.0
-    places, most, curvature = peak(captured, shifts)
-    misfit = np.maximum(np.einsum("rn,rn->r", weighted, weighted) - most, 1e-9)
-    return Fit(places, misfit, _STEP**2 / (-0.5 * curvature))
-
-
-def energy(projected: Projected) -> Projected:
-    """Sum of squares over the middle axis."""
-    return np.asarray(np.einsum("rkn,rkn->rn", projected, projected), dtype=np.float32)
-
-
-def peak(captured: Projected, shifts: Floats) -> tuple[Floats, Floats, Floats]:
-    """Shift of each row's most captured energy, that energy, its (negative) second difference."""
-    at = np.clip(np.argmax(captured, axis=1), 1, len(shifts) - 2)
-    a, b, c = (captured[np.arange(len(at)), at + k].astype(np.float64) for k in (-1, 0, 1))
+def peak(energy: Projected, shifts: Floats) -> tuple[Floats, Floats, Floats]:
+    """Shift (last axis) of the most energy, that energy, its (negative) second difference."""
+    at = np.clip(np.argmax(energy, axis=-1), 1, len(shifts) - 2)
+    flat = at + np.arange(at.size).reshape(at.shape) * len(shifts)
+    a, b, c = (energy.take(flat + k).astype(np.float64) for k in (-1, 0, 1))
     curvature = np.minimum(a - 2 * b + c, -1e-9)
-    step = shifts[1] - shifts[0]
-    return shifts[at] + np.clip(0.5 * (a - c) / curvature, -1, 1) * step, b, curvature
+    move = np.clip(0.5 * (a - c) / curvature, -1, 1) * (shifts[1] - shifts[0])
+    return shifts[at] + move, b, curvature

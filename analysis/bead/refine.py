@@ -1,6 +1,5 @@
 """From coarse toes to sub-pixel ones, in windows along each toe at the photo's own resolution."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -11,11 +10,11 @@ from scipy.ndimage import gaussian_filter1d
 
 from seamlog.errors import EvidenceError
 
-from .chain import best_chain
+from .chain import best_chains
 from .curve import Centreline
-from .edge_model import EdgeModel, choose_model, profiles_at, typical_blur
-from .edge_places import EdgePlaces, locate_edges, random_u, ruler_for, shading_along
-from .edge_shapes import Fit, Window
+from .edge_model import EdgeModel, choose_model, profiles_at, spread, typical_blur
+from .edge_places import EdgePlaces, locate_edges, random_u, ruler_for
+from .edge_shapes import Window
 from .image import Photo
 from .plane import Plane
 from .sampling import sample_rows
@@ -29,7 +28,7 @@ Rows = NDArray[np.int64]
 _ALONG_PX = 4.0
 _ALONG_WIDTHS = 0.03
 """Gaussian averaging along the seam: this many px at most, or this part of the width if more."""
-_SHARES = (1.0, 0.65, 0.42, 0.27, 0.18)
+_SHARES = np.array((1.0, 0.65, 0.42, 0.27, 0.18))
 """Parts of the longest averaging that are tried."""
 _CALM = 1.5
 """Windows follow the coarse toe averaged over this many longest averagings: what they average
@@ -37,10 +36,8 @@ must lie along a straight line."""
 _WINDOW_PX = 18
 _SEARCHED = 0.08
 """Half widths around the coarse toe in which the sharpest edge is looked for."""
-_MODEL_ROWS = 512
-"""Rows from which a toe's model is made at most, and from which the averaging along it is."""
 _TRIED_ROWS = 160
-_GOLDEN = (np.sqrt(5) - 1) / 2
+"""Rows on which the colours, the averaging and the softness of a toe are tried."""
 _SENSOR_PX = 0.02
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
 _RASTER_PX = 0.02
@@ -75,12 +72,30 @@ def refine_toes(
     photo: Photo, plane: Plane, line: Centreline, rough: Rough, unit: float, every: int
 ) -> tuple[Toes, Toes]:
     """Sub-pixel toes of both sides at each `every`-th row of `line`; `unit` is a px's length."""
-    left = _Side(photo, plane, line, rough.left, -1, rough, unit).refined(every)
-    return left, _Side(photo, plane, line, rough.right, 1, rough, unit).refined(every)
+    toes = ((rough.left, -1), (rough.right, 1))
+    left, right = (_Side(photo, plane, line, *toe, rough, unit, every) for toe in toes)
+    near = _sharpest(np.stack([left.calm, right.calm]), left.search)
+    return left.refined(near[0]), right.refined(near[1])
+
+
+def _sharpest(signals: Signal, reach: float) -> Floats:
+    """Chain of the steepest rises within reach of the middle column, for each of the signals."""
+    smooth = [cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.0)[::2] for signal in signals]
+    rise = np.gradient(smooth, axis=2)
+    columns = np.arange(signals.shape[2])
+    near = np.abs(columns - columns[-1] / 2) <= reach
+    typical = np.median(np.where(near, rise, 0).max(axis=2), axis=1)[:, None, None] + 1e-6
+    score = np.where(near, np.clip(rise / typical, 0, 1.5), -1e6).astype(np.float32)
+    rows = np.arange(signals.shape[1])
+    return np.array([np.interp(rows, rows[::2], chain) for chain in best_chains(score, 0.1)])
 
 
 class _Side:
-    """One toe: its windows, the bead to the right, as the mixture of colours that tells most."""
+    """One toe: its windows, the bead to the right, as the mixture of colours that tells most.
+
+    `calm` is that signal at each `every`-th row, averaged as long as is tried, and `search` the
+    columns around its middle in which the toe is.
+    """
 
     def __init__(
         self,
@@ -91,59 +106,60 @@ class _Side:
         side: int,
         rough: Rough,
         unit: float,
+        every: int,
     ) -> None:
         half_px, row_px = rough.half / unit, float(line.s[1] - line.s[0]) / unit
         self._longest = longest_px(half_px) / row_px
         toe = gaussian_filter1d(toe, _CALM * self._longest, mode="nearest")
         self._rough, self._toe, self._side, self._unit = rough, toe, side, unit
-        self._row_px = row_px
-        self._search = 3 + _SEARCHED * half_px
+        self._row_px, self._every = row_px, every
+        self._pick = np.arange(every // 2, len(toe), every)
+        self.search = 3 + _SEARCHED * half_px
         inside = max(3, min(_WINDOW_PX, int(0.8 * half_px)))
         self._window = Window(_WINDOW_PX, inside)
-        self._reach = _WINDOW_PX + int(np.ceil(self._search)) + 3
+        self._reach = _WINDOW_PX + int(np.ceil(self.search)) + 3
         step = -side * unit
         first = toe - self._reach * step
-        pixels, self._valid = sample_rows(photo, plane, line, first, step, 2 * self._reach + 1)
+        pixels, valid = sample_rows(photo, plane, line, first, step, 2 * self._reach + 1)
+        self._valid = valid[self._pick]
         depth = int(max(4, min(0.25 * half_px, self._reach)))
-        direction, self._distance = self._direction(pixels, depth)
-        self._signal = _mixed(pixels, direction)
-
-    def _direction(self, pixels: Signal, depth: int) -> tuple[Floats, float]:
-        rows = _tried(len(pixels), _TRIED_ROWS)
-        smooth, valid = averaged_at(pixels, rows, self._longest), self._valid[rows]
-        groups = []
-        for first in (self._reach + 1, self._reach - depth + 1):
-            part = slice(first, first + depth - 1)
-            groups.append(smooth[:, part][valid[:, part]])
-        if min(len(group) for group in groups) < _ENOUGH:
+        calm = averaged_at(pixels, self._pick, self._longest)
+        inner, outer = self._beside(calm, depth)
+        if min(len(inner), len(outer)) < _ENOUGH:
             raise EvidenceError(
-                "the plate beside the bead is not in the photo, so its toe cannot be told; "
-                "take the photo with plate on both sides"
+                f"{photo.name}: the plate beside the bead is not in the photo, so its toe cannot "
+                "be told; take the photo with plate on both sides"
             )
-        return fisher_direction(*groups)
+        direction, self._distance = fisher_direction(inner, outer)
+        self._signal, self.calm = _mixed(pixels, direction), _mixed(calm, direction)
 
-    def refined(self, every: int) -> Toes:
-        """The toe at each `every`-th row."""
-        pick = np.arange(every // 2, len(self._toe), every)
-        signal = averaged_at(self._signal, pick, self._longest)
-        near = self._sharpest(signal)
-        model = self._model(signal, near)
-        share = self._averaging(pick, near, model)
+    def _beside(self, calm: Signal, depth: int) -> tuple[Signal, Signal]:
+        """Samples of the bead and of the plate, `depth` columns from the coarse toe."""
+        rows, toe = spread(len(calm), _TRIED_ROWS), self._reach
+        samples, valid = calm[rows], self._valid[rows]
+        bead, plate = slice(toe + 1, toe + depth), slice(toe - depth + 1, toe)
+        return samples[:, bead][valid[:, bead]], samples[:, plate][valid[:, plate]]
+
+    def refined(self, near: Floats) -> Toes:
+        """The toe at each row of `calm`, where columns `near` it are known."""
+        model = choose_model(self.calm, np.rint(near).astype(np.int64), self._window)
+        share = self._averaging(near, model)
+        signal = self.calm
         if share < 1:
-            signal = averaged_at(self._signal, pick, share * self._longest)
+            signal = averaged_at(self._signal, self._pick, share * self._longest)
         places = locate_edges(signal, near, model)
-        smeared = self._smeared(places, share, every) if share < 1 else 0.0
-        return self._toes(places, smeared, share, pick, self._softness(signal, near, model))
+        smeared = self._smeared(places, share) if share < 1 else 0.0
+        return self._toes(places, smeared, share, self._softness(signal, near, model))
 
     def _softness(self, signal: Signal, near: Floats, model: EdgeModel) -> float:
         """Blur of the toe; that of single rows where their mean is soft, for a toe is ragged."""
         if model.blur <= _SHARP_PX:
             return model.blur
-        rows = _tried(len(near), _TRIED_ROWS)
+        rows = spread(len(near), _TRIED_ROWS)
         profiles = profiles_at(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
         return typical_blur(profiles, self._window)
 
-    def _smeared(self, places: EdgePlaces, share: float, every: int) -> float:
+    def _smeared(self, places: EdgePlaces, share: float) -> float:
         """Px of the toe's own waviness that blur and averaging take away, rms.
 
         One more smoothing takes less than they did, by as much as yet another one takes less
@@ -152,8 +168,8 @@ class _Side:
         """
         averaged = share * self._longest
         sigma = np.hypot(places.blur_px / self._row_px, averaged)
-        taken = places.column - _slow(places.column, sigma / every)
-        again = _slow(taken, sigma / every)
+        taken = places.column - _slow(places.column, sigma / self._every)
+        again = _slow(taken, sigma / self._every)
         wide, noise = (sigma / averaged) ** 2, float(np.median(places.u_noise)) ** 2
         first = float(np.var(taken)) - noise * _passed(0, wide)
         second = float(np.var(again)) - noise * _passed(1, wide)
@@ -161,68 +177,38 @@ class _Side:
             return 0.0
         return float(np.sqrt(first * np.clip(first / second, 1.0, _MOST_SMEARED**2)))
 
-    def _sharpest(self, signal: Signal) -> Floats:
-        """Chain of the steepest rises from plate to bead near the coarse toe."""
-        smooth = cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.0)[::2]
-        rise = np.gradient(smooth, axis=1)
-        inward = np.abs(np.arange(signal.shape[1]) - self._reach)
-        near = inward <= self._search
-        typical = np.median(np.where(near, rise, 0).max(axis=1)) + 1e-6
-        score = np.where(near, np.clip(rise / typical, 0, 1.5), -1e6).astype(np.float32)
-        rows = np.arange(len(signal))
-        return np.interp(rows, rows[::2], best_chain(score, 0.1))
-
-    def _model(self, signal: Signal, near: Floats) -> EdgeModel:
-        rows = _tried(len(near), _MODEL_ROWS)
-        return choose_model(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
-
-    def _averaging(self, pick: Rows, near: Floats, model: EdgeModel) -> float:
+    def _averaging(self, near: Floats, model: EdgeModel) -> float:
         """Part of the longest averaging with the least expected error (Stein's estimate)."""
-        rows = _tried(len(near), _TRIED_ROWS)
-        pick, centre = pick[rows], np.rint(near[rows]).astype(np.int64)
-        found: list[Fit] = []
-        sigmas = [share * self._longest for share in _SHARES]
-        for signal in averages_at(self._signal, pick, sigmas):
-            seen = profiles_at(signal, centre, model.window)
-            if not found:
-                shading = shading_along(seen, centre, model)
-            found.append(ruler_for(seen - shading, model).places(seen - shading))
-        places = np.array([centre + one.shift for one in found])
-        noise = float(np.median(random_u(found[-1], model.window))) ** 2
-        return _least_risk(places, np.array(_SHARES), noise)
+        rows = spread(len(near), _TRIED_ROWS)
+        centre = np.rint(near[rows]).astype(np.int64)
+        signals = averages_at(self._signal, self._pick[rows], _SHARES * self._longest)
+        seen = profiles_at(signals, centre, model.window)
+        plain = seen - model.shading[rows]
+        found = ruler_for(plain[-1], model).places(plain)
+        noise = float(np.median(random_u(found, model.window)[-1])) ** 2
+        return _least_risk(centre + found.shift, _SHARES, noise)
 
-    def _toes(
-        self, places: EdgePlaces, smeared: float, share: float, pick: Rows, soft_px: float
-    ) -> Toes:
+    def _toes(self, places: EdgePlaces, smeared: float, share: float, soft_px: float) -> Toes:
         column = places.column
         rows = np.arange(len(column))
         beyond = column - 3 - 2 * places.blur_px
         outside = np.clip(np.rint(beyond).astype(int), 0, 2 * self._reach)
         inward = column - self._reach
-        toe = self._toe.astype(np.float32)[:, None]
-        followed = averaged_at(toe, pick, share * self._longest)[:, 0]
+        followed = _slow(self._toe, share * self._longest)[self._pick]
         return Toes(
-            offset=followed.astype(np.float64) - self._side * self._unit * inward,
+            offset=followed - self._side * self._unit * inward,
             u_noise=places.u_noise * self._unit,
             u_model=np.hypot(places.u_model, _RASTER_PX) * self._unit,
             smeared=smeared * self._unit,
             height=places.height,
             bare=places.bare,
             within=places.within,
-            in_frame=self._valid[pick][rows, outside],
-            present=self._rough.present[pick],
+            in_frame=self._valid[rows, outside],
+            present=self._rough.present[self._pick],
             disagreement=np.abs(inward) * self._unit,
             distance=self._distance,
             blur_px=soft_px,
         )
-
-
-def _tried(count: int, most: int) -> Rows:
-    """Rows to try things on, spread unevenly: a ripple must not keep step with them."""
-    if count <= most:
-        return np.arange(count)
-    at = np.arange(most)
-    return np.asarray((at + at * _GOLDEN % 1.0) * count / most, dtype=np.int64)
 
 
 def _slow(values: Floats, sigma: float) -> Floats:
@@ -248,18 +234,19 @@ def _mixed(pixels: Signal, direction: Floats) -> Signal:
 
 def averaged_at(values: Signal, rows: Rows, sigma: float) -> Signal:
     """Gaussian averages over rows, at some rows only."""
-    return np.asarray(averages_at(values, rows, (sigma,))[0])
+    return np.asarray(averages_at(values, rows, np.array([sigma]))[0])
 
 
-def averages_at(values: Signal, rows: Rows, sigmas: Sequence[float]) -> Signal:
+def averages_at(values: Signal, rows: Rows, sigmas: Floats) -> Signal:
     """As `averaged_at` for several sigmas, the largest first, shape (sigmas, rows, ...)."""
     half = int(3 * sigmas[0] + 0.5)
     taps = np.arange(-half, half + 1)
-    kernels = np.exp(-0.5 * (taps / np.array(sigmas)[:, None]) ** 2)
-    kernels[np.abs(taps) > 3 * np.array(sigmas)[:, None] + 0.5] = 0.0
+    kernels = np.exp(-0.5 * (taps / sigmas[:, None]) ** 2)
+    kernels[np.abs(taps) > 3 * sigmas[:, None] + 0.5] = 0.0
     kernels = (kernels / kernels.sum(axis=1, keepdims=True)).astype(np.float32)
-    flat = np.pad(values.reshape(len(values), -1), [(half, half), (0, 0)], mode="edge")
-    around = sliding_window_view(flat, len(taps), axis=0)[_as_slice(rows)].swapaxes(1, 2)
+    flat = values.reshape(len(values), -1)
+    longer = cv2.copyMakeBorder(flat, half, half, 0, 0, cv2.BORDER_REPLICATE)
+    around = sliding_window_view(longer, len(taps), axis=0)[_as_slice(rows)].swapaxes(1, 2)
     found = np.matmul(kernels, around).swapaxes(0, 1)
     return np.asarray(found.reshape(len(sigmas), len(rows), *values.shape[1:]))
 

@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 from seamlog.analysis.bead.chain import best_chain
 from seamlog.analysis.bead.edge_model import choose_model, typical_blur
 from seamlog.analysis.bead.edge_places import locate_edges
-from seamlog.analysis.bead.edge_shapes import Window, basis, fit, step_at
+from seamlog.analysis.bead.edge_shapes import Window, basis, even_ruler, step_at
 from seamlog.analysis.bead.refine import averaged_at
 
 WINDOW = Window(18, 18)
@@ -39,6 +39,12 @@ def located(signal: Floats, toe: Floats) -> tuple[Floats, Floats, str]:
     return places.column - toe, np.hypot(places.u_noise, places.u_model), model.name
 
 
+def placed_evenly(signal: Floats) -> Floats:
+    """Columns of the toe by a plain step among noise that is taken to be even."""
+    found = even_ruler(WINDOW, 1.1, 2.5).places(signal[:, MIDDLE - 18 : MIDDLE + 19])
+    return MIDDLE + found.shift
+
+
 def rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
@@ -61,7 +67,7 @@ def test_what_lies_beside_a_step_does_not_move_it(model: str, parts: tuple[float
     toe = toes()
     seen = picture(toe, model, parts) + np.random.default_rng(1).normal(0, 1, (ROWS, COLUMNS))
     error, u, _ = located(seen, toe)
-    plain = fit(seen[:, MIDDLE - 18 : MIDDLE + 19], WINDOW, "step", 1.1, 2.5).shift + MIDDLE - toe
+    plain = placed_evenly(seen) - toe
     assert abs(np.median(error)) < 0.25 * abs(np.median(plain))
     assert abs(np.median(error)) < 2 * np.median(u)
 
@@ -73,7 +79,7 @@ def test_the_ripple_of_a_bead_moves_its_toe_less_than_an_even_fit_says() -> None
     inside = step_at(np.arange(COLUMNS) - toe[:, None], 1.1)
     seen = picture(toe) + inside * 10 * ripple / ripple.std() + rng.normal(0, 1, (ROWS, COLUMNS))
     error, u, _ = located(seen, toe)
-    even = fit(seen[:, MIDDLE - 18 : MIDDLE + 19], WINDOW, "step", 1.1, 2.5).shift + MIDDLE - toe
+    even = placed_evenly(seen) - toe
     assert np.std(error) < 0.6 * np.std(even)
     assert np.mean(np.abs(error) <= 1.96 * u) >= 0.85
 
@@ -88,7 +94,7 @@ def test_a_rise_is_found_beside_a_higher_fall() -> None:
     toe = np.full(ROWS, float(MIDDLE))
     z = np.arange(COLUMNS) - toe[:, None]
     seen = 90 + 40 * step_at(z, 1.1) - 120 * step_at(z - 12, 1.1)
-    found = fit(seen[:, MIDDLE - 8 : MIDDLE + 9], Window(8, 8), "step", 1.1, 2.5)
+    found = even_ruler(Window(8, 8), 1.1, 2.5).places(seen[:, MIDDLE - 8 : MIDDLE + 9])
     assert found.shift == pytest.approx(0.0, abs=0.4)
 
 
