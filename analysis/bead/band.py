@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from .features import Features, robust_scale
+from .features import Features, Planes, in_spreads, planes_of
 
 Floats = NDArray[np.float32]
 
@@ -53,9 +53,8 @@ class _Sums:
     reach over the borders.
     """
 
-    def __init__(self, features: Floats) -> None:
-        rows, self.columns, count = features.shape
-        planes = np.moveaxis(features, 2, 0)
+    def __init__(self, planes: Planes) -> None:
+        count, rows, self.columns = planes.shape
         total = np.cumsum(np.stack([planes, planes * planes]), axis=3, dtype=np.float64)
         size = 3 * self.columns + 1
         self._sums = np.zeros((2, count, rows, size), dtype=np.float32)
@@ -63,10 +62,10 @@ class _Sums:
         self._sums[..., 2 * self.columns + 1 :] = total[..., -1:]
         self._known = np.clip(np.arange(size) - self.columns, 0, self.columns).astype(np.float32)
 
-    def window(self, centres: range, start: int, stop: int) -> Floats:
-        """Means over columns [c + start, c + stop) for each c, (2, features, rows, c)."""
+    def window(self, centres: range, half: int) -> Floats:
+        """Means over columns [c - half, c + half) for each c, (2, features, rows, c)."""
         first, last = centres.start + self.columns, centres.stop + self.columns
-        before, up_to = slice(first + start, last + start), slice(first + stop, last + stop)
+        before, up_to = slice(first - half, last - half), slice(first + half, last + half)
         total = self._sums[..., up_to] - self._sums[..., before]
         total /= np.maximum(self._known[up_to] - self._known[before], 1)
         return np.asarray(total)
@@ -76,42 +75,42 @@ def _saturate(square: Floats, half_at: float) -> Floats:
     return square / (square + np.float32(half_at))
 
 
-def edge_evidence(features: Features, reach: int) -> Floats:
+def edge_evidence(planes: Planes, reach: int) -> Floats:
     """How sharply the features change at each column edge (0 to 1), shape (rows, columns + 1).
 
     The change between the two windows of `reach` columns on both sides, against their spread.
     """
-    rows, columns, count = features.shape
+    _, rows, columns = planes.shape
     both = np.full(2 * reach, 0.5 / reach)
-    change = _summed(features, np.repeat([-1.0, 1.0], reach) / reach)
-    mean, square = _summed(features, both), _summed(features * features, both)
+    change = _summed(planes, np.repeat([-1.0, 1.0], reach) / reach)
+    mean, square = _summed(planes, both), _summed(planes * planes, both)
     change *= change
     spread = square - mean * mean - change / 4
     change /= np.maximum(spread, 0, out=spread) + np.float32(_FLOOR)
-    total = cv2.transform(change, np.ones((1, count), dtype=np.float32))
     result = np.zeros((rows, columns + 1), dtype=np.float32)
     inner = slice(reach, columns - reach + 1)
-    result[:, inner] = _saturate(np.asarray(total[:, inner], dtype=np.float32), 1.5)
+    result[:, inner] = _saturate(change.sum(axis=0)[:, inner], 1.5)
     return result
 
 
-def _summed(features: Floats, weights: NDArray[np.float64]) -> Floats:
+def _summed(planes: Planes, weights: NDArray[np.float64]) -> Planes:
     """Weighted sums of the columns around each column edge."""
-    found = cv2.filter2D(features, -1, weights[None].astype(np.float32))
-    return np.asarray(found, dtype=np.float32).reshape(features.shape)
+    flat = planes.reshape(-1, planes.shape[2])
+    found = cv2.filter2D(flat, -1, weights[None].astype(np.float32))
+    return np.asarray(found, dtype=np.float32).reshape(planes.shape)
 
 
 def _contrast(sums: _Sums, centres: range, half: int) -> Floats:
     """Fisher contrast of a band against both its sides as one (0 to 1), shape (rows, centres).
 
-    Taking the sides together keeps a shadow between bead and plate from looking like a band:
-    its sides differ from each other more than from it. A band with more texture than its sides
-    counts up to a quarter more.
+    Each side is as broad as the band. Taking them together keeps a shadow between bead and plate
+    from looking like a band: its sides differ from each other more than from it. A band with more
+    texture than its sides counts up to a quarter more.
     """
-    reach = max(4, 2 * half)
-    one = sums.window(centres, -half - reach, -half)
-    two = sums.window(centres, half, half + reach)
-    (inside, square), (around, square_around) = sums.window(centres, -half, half), (one + two) / 2
+    away = 2 * half
+    means = sums.window(range(centres.start - away, centres.stop + away), half)
+    one, band, two = (means[..., at : at + len(centres)] for at in (0, away, 2 * away))
+    (inside, square), (around, square_around) = band, (one + two) / 2
     spread = (square + square_around - inside * inside - around * around) / 2
     change = (inside - around) ** 2 / (np.maximum(spread, 0) + np.float32(_FLOOR))
     rougher = np.maximum(inside[-1] - np.maximum(one[0, -1], two[0, -1]), 0)
@@ -142,8 +141,7 @@ class BandSearch:
         column, slack = held or (self.columns / 2, np.inf)
         beside = np.abs(np.arange(self.columns + 1) - column) - self._halves[:, None]
         weight = weight * np.exp(-0.5 * (np.maximum(beside, 0) / slack) ** 2)
-        scaled = (features / robust_scale(features)).astype(np.float32)
-        self._evidence = self._score(scaled, weight.astype(np.float32))
+        self._evidence = self._score(in_spreads(planes_of(features)), weight.astype(np.float32))
 
     def best(self, allowed: Floats | None = None, widest: float = np.inf) -> Band | None:
         """The band with the most evidence, or None without any.
@@ -158,13 +156,13 @@ class BandSearch:
         band = _trace(score, self._halves[keep], self._slope)
         return band if band is not None and band.last - band.first >= _SHORTEST else None
 
-    def _score(self, features: Features, weight: Floats) -> Floats:
+    def _score(self, planes: Planes, weight: Floats) -> Floats:
         """Evidence per section, half width and centre, shape (rows, halves, centres).
 
         `weight`, (halves, centres), multiplies it.
         """
-        sums = _Sums(features)
-        edges = np.maximum(edge_evidence(features, 2), edge_evidence(features, 4))
+        sums = _Sums(planes)
+        edges = np.maximum(edge_evidence(planes, 2), edge_evidence(planes, 4))
         near = cv2.dilate(edges, np.ones((1, 3), np.uint8))
         score = np.zeros((self.rows, *weight.shape), dtype=np.float32)
         whole = np.maximum(1, np.rint(self._halves)).astype(int)

@@ -9,7 +9,7 @@ from seamlog.errors import EvidenceError
 
 from .band import edge_evidence
 from .chain import best_chains
-from .features import Features, robust_scale, smoothed
+from .features import Features, Planes, in_spreads, planes_of, smoothed
 from .zones import likeness, zone
 
 Floats = NDArray[np.float64]
@@ -49,17 +49,17 @@ class Extent:
 
 @dataclass(frozen=True, slots=True)
 class StripLook:
-    """A strip's features averaged along it, (rows, columns, k), what is in the photo, its edges."""
+    """A strip's features averaged along it, what of it is in the photo, its edges."""
 
-    features: Features
+    planes: Planes
     valid: NDArray[np.bool_]
     edges: NDArray[np.float32]
 
 
 def strip_look(features: Features, valid: NDArray[np.bool_], along: float) -> StripLook:
     """The look of a strip, averaged over `along` rows (Gaussian sigma)."""
-    smooth = smoothed(features, 0.8, along)
-    return StripLook(smooth, valid, _edges(smooth))
+    planes = planes_of(smoothed(features, 0.8, along))
+    return StripLook(planes, valid, _edges(in_spreads(planes)))
 
 
 def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> Extent:
@@ -67,7 +67,7 @@ def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> 
 
     Between a toe and `beyond` half widths outside of it nothing counts as plate beforehand.
     """
-    valid, columns = look.valid, look.features.shape[1]
+    valid, columns = look.valid, look.valid.shape[1]
     half = float(np.median(rough.half))
     bead = zone(
         columns, rough.middle - _CORE * rough.half, rough.middle + _CORE * rough.half, valid
@@ -77,7 +77,7 @@ def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> 
     windows = _windows(columns, rough, reach)
     scores, present = [], np.full(len(rough.left), np.inf)
     for side, edge, window in zip((-1, 1), (rough.left, rough.right), windows, strict=True):
-        like = likeness(look.features, bead, _plate(columns, edge, side, half, beyond, valid))
+        like = likeness(look.planes, bead, _plate(columns, edge, side, half, beyond, valid))
         like *= valid
         near = np.abs(np.arange(window.start, window.stop) - edge[:, None]) <= reach
         scores.append(_score(like[:, window], look.edges[:, window], side, half, near))
@@ -116,10 +116,9 @@ def _plate(
     )
 
 
-def _edges(features: Features) -> NDArray[np.float32]:
+def _edges(planes: Planes) -> NDArray[np.float32]:
     """Edge evidence at columns: the mean of the two column edges around each."""
-    scaled = (features / robust_scale(features)).astype(np.float32)
-    at_edges = np.maximum(edge_evidence(scaled, 2), edge_evidence(scaled, 5))
+    at_edges = np.maximum(edge_evidence(planes, 2), edge_evidence(planes, 5))
     return np.asarray(0.5 * (at_edges[:, :-1] + at_edges[:, 1:]), dtype=np.float32)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from .features import Features
+from .features import Features, Planes, quantiles
 
 Floats = NDArray[np.float64]
 
@@ -46,17 +46,17 @@ def zone(columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]) ->
 
 
 def likeness(
-    features: Features, inside: NDArray[np.bool_], outside: NDArray[np.bool_]
+    planes: Planes, inside: NDArray[np.bool_], outside: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
     """Log-likelihood ratio inside : outside per place, by how often its look occurs in each.
 
     Colours are counted together, in a smoothed histogram, since a bead has many: metal, slag,
     glare. Texture is counted by itself and weighs less. Clipped, so that no place decides alone.
     """
-    planes = np.ascontiguousarray(features.reshape(inside.size, -1).T)
+    flat = planes.reshape(len(planes), -1)
     zones = np.flatnonzero(inside), np.flatnonzero(outside)
-    ratio = _log_ratio(planes[:-1], *zones)
-    ratio += np.float32(_TEXTURE) * _log_ratio(planes[-1:], *zones)
+    ratio = _log_ratio(flat[:-1], *zones)
+    ratio += np.float32(_TEXTURE) * _log_ratio(flat[-1:], *zones)
     return np.clip(ratio, -_CLIP, _CLIP, out=ratio).reshape(inside.shape)
 
 
@@ -67,7 +67,7 @@ def _log_ratio(
     both = np.concatenate([inside, outside])
     places = np.zeros(planes.shape[1], dtype=np.int64)
     for plane in planes:
-        places = places * _BINS + _bins(plane, *np.percentile(plane[both], (1, 99)))
+        places = places * _BINS + _bins(plane, *quantiles(plane[both], 0.01))
     a, b = (_shares(places[zone_], len(planes)) for zone_ in (inside, outside))
     return np.asarray(np.log(a / b).astype(np.float32)[places])
 
