@@ -20,6 +20,7 @@ from .edge_shapes import (
     basis,
     even_ruler,
     level_weighted,
+    middle,
     parameters,
     peak,
     resolved,
@@ -70,9 +71,10 @@ class EdgeModel:
 
 def profiles_at(signal: Projected, centre: Rows, window: Window) -> Projected:
     """Profiles (..., rows, window) around a column of each row, the bead to the right."""
-    columns = centre[:, None] + window.columns.astype(np.int64)
-    rows = np.arange(len(centre))[:, None]
-    return signal[..., rows, np.clip(columns, 0, signal.shape[-1] - 1)]
+    *stack, rows, width = signal.shape
+    columns = np.clip(centre[:, None] + window.columns.astype(np.int64), 0, width - 1)
+    at = columns + (np.arange(rows) * width)[:, None]
+    return np.asarray(signal.reshape(*stack, -1).take(at, axis=-1))
 
 
 def choose_model(signal: Projected, centre: Rows, window: Window) -> EdgeModel:
@@ -178,10 +180,9 @@ def _along(shading: Floats, shift: Floats) -> Profiles:
     rows, blocks = len(shift), len(shading)
     at = np.clip(np.linspace(0, blocks, rows) - 0.5, 0, blocks - 1)
     low = np.minimum(at.astype(np.int64), max(blocks - 2, 0))
-    part = (at - low)[:, None]
-    before = moved(shading, low, -shift)
-    behind = moved(shading, np.minimum(low + 1, blocks - 1), -shift)
-    return np.asarray(before + part * (behind - before), dtype=np.float32)
+    before, behind = shading[low], shading[np.minimum(low + 1, blocks - 1)]
+    between = before + (at - low)[:, None] * (behind - before)
+    return moved(between.astype(np.float32), -shift)
 
 
 def aligned_means(profiles: Profiles, shift: Floats) -> Floats:
@@ -189,20 +190,19 @@ def aligned_means(profiles: Profiles, shift: Floats) -> Floats:
     count = min(_BLOCKS, max(1, len(profiles) // 4))
     size, more = divmod(len(profiles), count)
     lengths = size + (np.arange(count) < more)
-    straight = moved(profiles, np.arange(len(profiles)), shift)
+    straight = moved(profiles, shift)
     sums = np.add.reduceat(straight, np.cumsum(lengths) - lengths)
     return np.asarray(sums / lengths[:, None])
 
 
-def moved(profiles: Profiles, rows: Rows, shift: Floats) -> Profiles:
-    """Profiles of some rows read `shift` columns further on (linear interpolation)."""
-    count = profiles.shape[1]
+def moved(profiles: Profiles, shift: Floats) -> Profiles:
+    """Profiles read `shift` columns further on (linear interpolation)."""
+    rows, count = profiles.shape
     whole = np.floor(shift)
-    columns = np.arange(count) + whole.astype(np.int64)[:, None]
-    first = (rows * count)[:, None]
-    low = profiles.take(first + np.clip(columns, 0, count - 1))
-    high = profiles.take(first + np.clip(columns + 1, 0, count - 1))
-    return np.asarray(low + (shift - whole).astype(profiles.dtype)[:, None] * (high - low))
+    columns = np.arange(count + 1) + whole.astype(np.int64)[:, None]
+    near = profiles.take(np.clip(columns, 0, count - 1) + (np.arange(rows) * count)[:, None])
+    part = (shift - whole).astype(profiles.dtype)[:, None]
+    return np.asarray(near[:, :-1] + part * (near[:, 1:] - near[:, :-1]))
 
 
 def _tried(means: Floats, window: Window) -> list[_Candidate]:
@@ -210,7 +210,7 @@ def _tried(means: Floats, window: Window) -> list[_Candidate]:
     weighted, models = level_weighted(means, window), tuple(MODELS)
     space = subspaces(window, models, _BLURS_PX, 1.5)
     captured = space.energies(weighted)
-    floor = GREY_FLOOR + (EDGE_FLOOR * float(np.median(np.ptp(means, axis=1)))) ** 2
+    floor = GREY_FLOOR + (EDGE_FLOOR * float(middle(np.ptp(means, axis=1)))) ** 2
     logs = _log_misfits(weighted, window, models, captured, floor)
     each, best = np.arange(len(models)), np.argmin(logs, axis=1)
     at = np.clip(best, 1, len(_BLURS_PX) - 2)
@@ -218,7 +218,7 @@ def _tried(means: Floats, window: Window) -> list[_Candidate]:
     move = np.clip(0.5 * (a - c) / np.maximum(a - 2 * b + c, 1e-9), -1, 1)
     blurs = np.array(_BLURS_PX)[at] * (_BLURS_PX[1] / _BLURS_PX[0]) ** move
     scores = b - 0.25 * (a - c) * move
-    places = np.median(peak(captured[each, :, best].swapaxes(1, 2), space.shifts)[0], axis=1)
+    places = middle(peak(captured[each, :, best].swapaxes(1, 2), space.shifts)[0])
     nearest = np.searchsorted(space.shifts[:-1] + space.shifts[1:], 2 * places)
     steps = space.heights[each, nearest, best] @ weighted.mean(axis=0)
     found = zip(models, *np.array([blurs.round(2), scores, places, steps]).tolist(), strict=True)
@@ -235,7 +235,7 @@ def _log_misfits(
     """Log of the typical misfit with the price of the parameters, (models, blurs)."""
     count = np.array([[parameters(model)] for model in models])
     whole = np.einsum("rn,rn->r", weighted, weighted)
-    left = np.median(whole - captured.max(axis=1), axis=-1)
+    left = middle(whole - captured.max(axis=1))
     misfit = np.maximum(left / np.maximum(window.size - count - 1, 1.0), 0)
     return np.asarray(np.log(misfit + floor) + _price(window) * (count - 2))
 

@@ -218,8 +218,8 @@ class Ruler:
         A step that falls towards the bead captures nothing.
         """
         weighted = profiles @ self.white
-        energy = np.square(np.maximum(weighted @ self.steps, 0))
-        places, most, curvature = peak(energy, self.shifts)
+        at, around = _highest(weighted @ self.steps)
+        places, most, curvature = _vertex(self.shifts, at, np.square(np.maximum(around, 0)))
         misfit = np.maximum(np.einsum("...n,...n->...", weighted, weighted) - most, 1e-9)
         return Fit(places, misfit, _STEP**2 / (-0.5 * curvature))
 
@@ -232,9 +232,25 @@ def even_ruler(window: Window, blur: float, reach: float) -> Ruler:
 
 def peak(energy: Projected, shifts: Floats) -> tuple[Floats, Floats, Floats]:
     """Shift (last axis) of the most energy, that energy, its (negative) second difference."""
-    at = np.clip(np.argmax(energy, axis=-1), 1, len(shifts) - 2)
-    flat = at + np.arange(at.size).reshape(at.shape) * len(shifts)
-    a, b, c = (energy.take(flat + k).astype(np.float64) for k in (-1, 0, 1))
+    return _vertex(shifts, *_highest(energy))
+
+
+def _highest(values: Profiles) -> tuple[NDArray[np.int64], Floats]:
+    """Where along the last axis values are highest, and they before, there and behind, (3, ...)."""
+    last = values.shape[-1]
+    at = np.clip(np.argmax(values, axis=-1), 1, last - 2)
+    flat = at + np.arange(at.size).reshape(at.shape) * last
+    return at, np.array([values.take(flat + k) for k in (-1, 0, 1)], dtype=np.float64)
+
+
+def _vertex(shifts: Floats, at: NDArray[np.int64], around: Floats) -> tuple[Floats, Floats, Floats]:
+    a, b, c = around
     curvature = np.minimum(a - 2 * b + c, -1e-9)
     move = np.clip(0.5 * (a - c) / curvature, -1, 1) * (shifts[1] - shifts[0])
     return shifts[at] + move, b, curvature
+
+
+def middle(values: Profiles) -> Floats:
+    """Median over the last axis; to sort short rows takes a fraction of NumPy's own median."""
+    ordered, count = np.sort(values, axis=-1), values.shape[-1]
+    return np.asarray((ordered[..., (count - 1) // 2] + ordered[..., count // 2]) / 2)
