@@ -25,7 +25,7 @@ _BROAD = 0.12
 """Power of the width that evidence grows with: of two bands as evident the broader tells more."""
 _SHORTEST = 2
 """Sections from the first to the last that make a band: fewer have no direction."""
-_NEGLIGIBLE = 1e-3
+_NEGLIGIBLE = 0.02
 """Weight below which a band is not looked at."""
 _FLOOR = 0.15
 """Variance (of scaled features) that any zone has, however flat it looks."""

@@ -1,7 +1,5 @@
 """Dynamic programming: the smooth chain of columns, one per row, that gathers the most evidence."""
 
-import itertools
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,13 +18,14 @@ def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int6
     values = np.full((rows, count, columns + 2), -np.inf, dtype=np.float32)
     values[:, :, 1:-1] = np.swapaxes(score, 0, 1)
     cost = np.float32(move_cost)
-    flat = values.reshape(rows, -1)
-    best = np.empty_like(flat[0, 1:-1])
-    for before, now in itertools.pairwise(flat):
-        np.maximum(before[:-2], before[2:], out=best)
+    flat = values.reshape(len(values), -1)
+    less, same, more = flat[:, :-2], flat[:, 1:-1], flat[:, 2:]
+    best = np.empty_like(same[0])
+    for below, at, above, now in zip(less[:-1], same[:-1], more[:-1], same[1:], strict=True):
+        np.maximum(below, above, out=best)
         np.subtract(best, cost, out=best)
-        np.maximum(best, before[1:-1], out=best)
-        now[1:-1] += best
+        np.maximum(best, at, out=best)
+        np.add(now, best, out=now)
     return _walked_back(values, cost)
 
 

@@ -56,7 +56,7 @@ def fit_centreline(path: Points, step: float, knot_spacing: float) -> Centreline
     walked = arc_length(curve(dense))
     s = np.arange(0.0, walked[-1] + 1e-9, step)
     at = np.interp(s, walked, dense)
-    tangent = curve.derivative()(at)
+    tangent = np.asarray(curve(at, nu=1))
     tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
     normals = np.column_stack([-tangent[:, 1], tangent[:, 0]])
     return Centreline(s, np.asarray(curve(at)), normals)

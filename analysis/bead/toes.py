@@ -81,9 +81,9 @@ def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> 
         like *= valid
         near = np.abs(np.arange(window.start, window.stop) - edge[:, None]) <= reach
         scores.append(_score(like[:, window], look.edges[:, window], side, half, near))
-        inside = np.where(core, like, 0).sum(axis=1) / np.maximum(core.sum(axis=1), 1)
-        present = np.minimum(present, inside)
+        present = np.minimum(present, (core * like).sum(axis=1))
     left, right = best_chains(np.stack(scores), _MOVE).astype(np.float64)
+    present /= np.maximum(np.count_nonzero(core, axis=1), 1)
     return Extent(left + windows[0].start, right + windows[1].start, present)
 
 

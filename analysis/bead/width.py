@@ -108,7 +108,7 @@ def assemble(
         right_px=sides[1][bead][order],
         centre_px=centre_px[bead][order],
         flagged=flagged[bead][order],
-        reason=tuple(str(reason) for reason in reasons[bead][order]),
+        reason=tuple(reasons[bead][order].tolist()),
         unit_per_px=unit,
         confidence=sure,
         warnings=_warnings(plane, found),

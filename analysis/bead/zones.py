@@ -1,5 +1,6 @@
 """Bead and plate as zones of the strip: how each looks, and which of the two a place looks like."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,8 +42,9 @@ def look_of(samples: Features) -> Look:
 
 def zone(columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mask of columns in [start, stop) per row, where the photo has samples."""
-    at = np.arange(float(columns))
-    return (at >= start[:, None]) & (at < stop[:, None]) & valid
+    at = np.arange(columns, dtype=np.int32)
+    first, end = (np.ceil(bound).astype(np.int32)[:, None] for bound in (start, stop))
+    return (at >= first) & (at < end) & valid
 
 
 def likeness(
@@ -65,9 +67,8 @@ def _log_ratio(
 ) -> NDArray[np.float32]:
     """Of the channels `planes` (k, places) together, by the places of both zones."""
     both = np.concatenate([inside, outside])
-    places = np.zeros(planes.shape[1], dtype=np.int64)
-    for plane in planes:
-        places = places * _BINS + _bins(plane, *quantiles(plane[both], 0.01))
+    bins = (_bins(plane, *quantiles(plane[both], 0.01)) for plane in planes)
+    places = functools.reduce(lambda places, more: places * _BINS + more, bins)
     a, b = (_shares(places[zone_], len(planes)) for zone_ in (inside, outside))
     return np.asarray(np.log(a / b).astype(np.float32)[places])
 
