@@ -143,12 +143,13 @@ def _candidates(means: Floats, window: Window) -> list[_Candidate]:
     """
     plain, *richer = _tried(means, window)
     far = _FAR * _price(window)
-    kept = [plain]
+    kept, best = [plain], plain.score
     for one in sorted((one for one in richer if resolved(one.name, plain.blur)), key=_by_score):
-        if one.score > min(kept, key=_by_score).score + far:
+        if one.score > best + far:
             break
         if one.step > _CARRIES * plain.step:
             kept.append(one)
+            best = min(best, one.score)
     return kept
 
 
