@@ -15,6 +15,8 @@ Planes = NDArray[np.float32]
 
 _TEXTURE_FLOOR = 1.5
 """Grey levels of detail that count as none: 8-bit rounding and a little camera noise."""
+_SAMPLES, _EVERY = 4096, 7
+"""Samples that show a quantile, and how many of more are one: columns must not be missed."""
 _SPOT = np.ones((7, 7), np.uint8)
 """What is textured must be broader than this: the energy of a bare edge spreads over 2.5 reaches
 to both sides, and a band as narrow as that at each toe would look like a bead of its own."""
@@ -85,10 +87,11 @@ def in_spreads(planes: Planes) -> Planes:
 
 
 def quantiles(values: NDArray[np.float32], share: float) -> tuple[float, float]:
-    """The quantiles `share` and 1 - `share` of values (n,), none of them NaN.
+    """The quantiles `share` and 1 - `share` of values (n,), of many from every few of them.
 
     As of `np.quantile`, whose look for NaN takes longer than all the rest.
     """
+    values = values[:: min(_EVERY, 1 + len(values) // _SAMPLES)]
     last = len(values) - 1
     below, part = int(share * last), share * last % 1
     order = [below, min(below + 1, last), max(last - below - 1, 0), last - below]
