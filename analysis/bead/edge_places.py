@@ -12,22 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from .edge_model import (
-    EDGE_FLOOR,
-    GREY_FLOOR,
-    EdgeModel,
-    aligned_means,
-    profiles_at,
-)
-from .edge_shapes import (
-    Fit,
-    Floats,
-    Profiles,
-    Ruler,
-    Window,
-    even_ruler,
-    step_at,
-)
+from .edge_model import EDGE_FLOOR, GREY_FLOOR, EdgeModel, aligned_means, profiles_at
+from .edge_shapes import Fit, Floats, Profiles, Ruler, Window, even_ruler, step_at
 
 _REACH = 4.0
 """Columns around where an edge is looked for."""
@@ -84,6 +70,7 @@ def _whitening(plain: Profiles, model: EdgeModel) -> Floats:
     at = window.columns
     texture = plain - cv2.blur(plain, (1, _SLOW), borderType=cv2.BORDER_REPLICATE)
     lags = np.abs(np.subtract.outer(np.arange(len(at)), np.arange(len(at))))
+    # over rows that lie together: NumPy takes twice as long over each short one
     size = float(np.median(np.ptp(plain.T.copy(), axis=0)))
     covariance = np.eye(len(at)) * (GREY_FLOOR + (EDGE_FLOOR * size) ** 2)
     step, clear = step_at(at, blur), 2.0 * blur + 1.5

@@ -149,7 +149,7 @@ class Subspaces:
     shifts: Floats
     blurs: tuple[float, ...]
     added: Projected
-    heights: Floats
+    heights: Projected
 
     def energies(self, weighted: Projected) -> Projected:
         """Energy of profiles without level that models capture, (models, shifts, blurs, rows)."""
@@ -181,8 +181,8 @@ def subspaces(
         last = np.moveaxis(directions[..., -_added(model) :], -1, 0)
         added.append(last.reshape(len(last), -1, len(window.columns)))
         heights.append(np.einsum("...nk,...k->...n", directions, np.linalg.inv(sizes)[..., 1, :]))
-    found = np.concatenate(added).astype(np.float32)
-    return Subspaces(models, shifts, blurs, found, np.array(heights))
+    added32, heights32 = np.concatenate(added).astype(np.float32), np.array(heights, np.float32)
+    return Subspaces(models, shifts, blurs, added32, heights32)
 
 
 def _added(model: str) -> int:

@@ -93,8 +93,8 @@ def _sharpest(signals: Signal, reach: float) -> Floats:
 class _Side:
     """One toe: its windows, the bead to the right, as the mixture of colours that tells most.
 
-    `calm` is that signal at each `every`-th row, averaged as long as is tried, and `search` the
-    columns around its middle in which the toe is.
+    `calm` is that signal at each `every`-th row, averaged as long as is tried, and `search` how
+    many columns around its middle the toe may be.
     """
 
     def __init__(
@@ -178,7 +178,10 @@ class _Side:
         return float(np.sqrt(first * np.clip(first / second, 1.0, _MOST_SMEARED**2)))
 
     def _averaging(self, near: Floats, model: EdgeModel) -> float:
-        """Part of the longest averaging with the least expected error (Stein's estimate)."""
+        """Part of the longest averaging with the least expected error (Stein's estimate).
+
+        One ruler measures all, so that the places differ by what averaging does and nothing else.
+        """
         rows = spread(len(near), _TRIED_ROWS)
         centre = np.rint(near[rows]).astype(np.int64)
         signals = averages_at(self._signal, self._pick[rows], _SHARES * self._longest)
