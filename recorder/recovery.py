@@ -33,7 +33,7 @@ from seamlog.session import open_session
 from .accounts import Account
 from .recovery_check import check_by_second_reader
 from .recovery_file import RecoveredFile
-from .recovery_rings import drain, find_rings
+from .recovery_rings import define_channels, drain, find_rings
 from .recovery_tail import tail_messages
 from .segment import part_of
 
@@ -118,6 +118,8 @@ class _Recovery:
         with replacing(result.output, force) as partial:
             with partial.open("xb", buffering=0) as raw:
                 file = RecoveredFile(raw, self._index)
+                if self._rings is not None:
+                    define_channels(self._rings, file)
                 self._copy(file)
                 accounts = self._drain(file)
                 self._count(accounts)

@@ -32,23 +32,30 @@ class RecoveredFile:
             file, index.library or f"seamlog {__version__}", index.profile or "ros2"
         )
         self._metadata: list[tuple[str, dict[str, str]]] = []
+        self._defined: set[int] = set()
         self._add_channels(index)
         self._written: dict[int, list[set[int]]] = {}
         self.known = set(index.channels)
+        """Channels whose topic is known."""
         self.counts: dict[int, int] = {}
         self.newest_ns = 0
 
     def _add_channels(self, index: FileIndex) -> None:
         for schema in index.schemas.values():
             self._writer.add_schema(schema.name, schema.data, schema.encoding, schema.id)
-        used = {number for entry in index.chunks for number in entry.index_offsets}
         for row in index.channels.values():
             schema_id = row.schema_id if row.schema_id in index.schemas else 0
             self._writer.add_channel(
                 row.topic, schema_id, row.metadata, row.message_encoding, row.id
             )
-        for number in sorted(used - index.channels.keys()):
-            self._writer.add_channel(f"/recovered/channel_{number}", 0, {}, "", number)
+        self._defined |= set(index.channels)
+
+    def _define(self, numbers: list[int]) -> None:
+        """Give channels whose record is gone one of their own: no reader takes messages without."""
+        for number in numbers:
+            if number not in self._defined:
+                self._writer.add_channel(f"/recovered/channel_{number}", 0, {}, "", number)
+                self._defined.add(number)
 
     def copy_chunk(
         self, source: FileSource, entry: ChunkEntry, offsets: NDArray[np.int64], heads: NDArray[Any]
@@ -96,6 +103,7 @@ class RecoveredFile:
         front = records.chunk_head(start, end, size, crc, compression, len(body))
         length = len(front) + len(body)
         numbers = np.unique(heads["channel"]).tolist()
+        self._define(numbers)
         mine = {number: heads["channel"] == number for number in numbers}
         packed = [
             message_index(n, times[rows], offsets[rows].astype(np.uint64))
@@ -139,11 +147,12 @@ class RecoveredFile:
 
     def add_channel(self, topic: str, channel_id: int, metadata: Mapping[str, str]) -> None:
         """Take in a channel of the table unless the file has it."""
-        if channel_id not in self.known:
+        if channel_id not in self._defined:
             row = CHANNELS[topic]
             schema = self._writer.schema_id(row.schema, definition(row))
             self._writer.add_channel(topic, schema, metadata, "cdr", channel_id)
             self.known.add(channel_id)
+            self._defined.add(channel_id)
 
     def write_chunk(
         self,

@@ -100,6 +100,14 @@ def _maps(pid: int, folder: Path) -> bool:
         return False
 
 
+def define_channels(rings: Rings, file: RecoveredFile) -> None:
+    """Take in the channels of the rings: chunks whose channel records are gone find them here."""
+    for _, item in iter_items(rings.folder, 1):
+        if item["kind"] == "channel":
+            file.add_channel(item["topic"], item["channel_id"], item["metadata"])
+    file.add_channel(_STATUS.topic, STATUS_ID, {"producer": "recorder"})
+
+
 def drain(rings: Rings, file: RecoveredFile, missing: Mapping[int, int]) -> dict[int, Account]:
     """Write what the rings hold behind what `file` has, and the final accounts.
 
@@ -144,7 +152,6 @@ def _take_items(folder: Path, file: RecoveredFile) -> Iterator[Feed]:
 def _feed(folder: Path, item: dict[str, Any], file: RecoveredFile) -> Feed:
     topic, channel_id, metadata = item["topic"], item["channel_id"], item["metadata"]
     ring = open_ring(folder / item["ring"])
-    file.add_channel(topic, channel_id, metadata)
     producer = metadata.get("producer", "")
     if ring.stride:
         return FixedFeed(channel_id, topic, producer, ring, file)
@@ -170,7 +177,6 @@ def _final(feed: Feed, missing: int, in_snapshots: bool) -> Account:
 def _write_accounts(file: RecoveredFile, accounts: list[Account]) -> None:
     if not accounts:
         return
-    file.add_channel(_STATUS.topic, STATUS_ID, {"producer": "recorder"})
     time_ns, first = file.newest_ns, file.last_sequence(STATUS_ID) + 1
     records = [
         message_record(

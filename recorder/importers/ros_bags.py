@@ -104,7 +104,7 @@ def _messages_of_ros1(path: Path, report: Report) -> Iterator[tuple[Any, int, by
     reader = Reader(path)
     try:
         reader.open()
-    except (ReaderError, *_DAMAGED) as error:
+    except (ReaderError, OSError, *_DAMAGED) as error:
         yield from _walked(path, report, error)
         return
     try:

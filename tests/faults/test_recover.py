@@ -205,3 +205,26 @@ def test_programs_read_the_losses(live: Path, capsys: pytest.CaptureFixture[str]
     assert run(["recover", str(live)]) == 2
     assert run(["recover", str(live), "--force"]) == 1
     assert "Some of it is lost" in capsys.readouterr().out
+
+
+def test_messages_of_a_channel_whose_record_is_gone_are_kept_under_its_number(
+    tmp_path: Path,
+) -> None:
+    """Of three channels in a chunk one has its record left and its index, which spans the chunk."""
+    path = tmp_path / "x.mcap"
+    write_foreign(path, {}, 200)
+    whole, first, entry = path.read_bytes(), entries(path)[0], entries(path)[2]
+    texts = (struct.pack("<I", len(text)) + text for text in (b"/table/encoder", b"cdr", b""))
+    channel = struct.pack("<HH", 1, 0) + b"".join(texts)
+    left = [whole[: first.offset], struct.pack("<BQ", records.CHANNEL, len(channel)), channel]
+    index = entry.index_offsets[1]
+    size = 9 + int.from_bytes(whole[index + 1 : index + 9], "little")
+    left += [whole[entry.offset :][: entry.length], whole[index:][:size]]
+    path.write_bytes(b"".join(left))
+    found = recover(path)
+    named = {"/table/encoder", "/recovered/channel_2", "/recovered/channel_3"}
+    assert {row.topic for row in found.channels} == named
+    with open_session(found.output) as session:
+        counts = {topic: row.count for topic, row in session.info.channels.items()}
+    assert counts == {row.topic: row.kept for row in found.channels}
+    assert min(counts.values()) > 2

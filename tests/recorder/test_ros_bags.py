@@ -234,13 +234,14 @@ def read_p(session: Path) -> list[float]:
 
 
 @pytest.mark.parametrize("compression", ["", "LZ4", "BZ2"])
+@pytest.mark.parametrize("place", [0, 1 << 63], ids=["of a killed recorder", "beyond all files"])
 def test_a_ros1_bag_without_an_index_is_walked(
-    tmp_path: Path, session: Path, compression: str, capsys: Any
+    tmp_path: Path, session: Path, compression: str, place: int, capsys: Any
 ) -> None:
     bag = write_ros1(tmp_path / "x.bag", compression)
     data = bytearray(bag.read_bytes())
     at = data.find(b"index_pos=") + 10
-    data[at : at + 8] = bytes(8)  # as a recorder that was killed leaves it
+    data[at : at + 8] = place.to_bytes(8, "little")
     bag.write_bytes(data)
     code, told = imported(bag, session, capsys)
     assert (code, told["losses"]) == (0, [])
