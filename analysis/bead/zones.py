@@ -67,10 +67,10 @@ def _log_ratio(
 ) -> NDArray[np.float32]:
     """Of the channels `planes` (k, places) together, by the places of both zones."""
     both = np.concatenate([inside, outside])
-    bins = (_bins(plane, *quantiles(plane[both], 0.01)) for plane in planes)
+    bins = (_bins(plane, *quantiles(plane.take(both), 0.01)) for plane in planes)
     places = functools.reduce(lambda places, more: places * _BINS + more, bins)
-    a, b = (_shares(places[zone_], len(planes)) for zone_ in (inside, outside))
-    return np.asarray(np.log(a / b).astype(np.float32)[places])
+    a, b = (_shares(places.take(zone_), len(planes)) for zone_ in (inside, outside))
+    return np.log(a / b).astype(np.float32).take(places)
 
 
 def _bins(plane: NDArray[np.float32], low: float, high: float) -> NDArray[np.int64]:
