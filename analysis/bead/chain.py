@@ -4,18 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def best_chain(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int64]:
-    """Column per row of `score` (rows, columns), moving at most one column per row.
-
-    -inf in `score` marks forbidden places.
-    """
-    return np.asarray(best_chains(score[None], move_cost)[0])
-
-
 def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int64]:
-    """As `best_chain` for several scores (n, rows, columns) at once, shape (n, rows).
+    """Column per row of each of n scores, shape (n, rows), moving at most one column per row.
 
-    Gathered from both ends at once, which takes half the steps, until they meet in the middle row.
+    `score`, (n, rows, columns), marks forbidden places by -inf. Chains are gathered from both ends
+    at once, which takes half the steps, until they meet in the middle row.
     """
     count, rows, columns = score.shape
     middle = (rows - 1) // 2

@@ -1,15 +1,10 @@
 """Placing a toe below a pixel: profiles whose edge is known."""
 
-import itertools
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from seamlog.analysis.bead.chain import best_chain
 from seamlog.analysis.bead.edge_model import choose_model, typical_blur
 from seamlog.analysis.bead.edge_places import locate_edges
 from seamlog.analysis.bead.edge_shapes import Window, basis, even_ruler, step_at
@@ -102,20 +97,6 @@ def test_a_ragged_toe_is_as_sharp_as_its_rows() -> None:
     toe = MIDDLE + np.random.default_rng(4).normal(0, 1.2, ROWS)
     rows = picture(toe)[:, MIDDLE - 18 : MIDDLE + 19]
     assert typical_blur(rows, WINDOW) == pytest.approx(1.1, rel=0.2)
-
-
-@given(st.lists(st.lists(st.integers(-9, 9), min_size=3, max_size=3), min_size=2, max_size=5))
-def test_a_chain_gathers_the_most_of_all_chains(rows: list[list[int]]) -> None:
-    score = np.array(rows, dtype=np.float32)
-
-    def gathered(path: tuple[int, ...]) -> float:
-        moves = np.abs(np.diff(path))
-        if moves.max() > 1:
-            return -np.inf
-        return float(score[np.arange(len(score)), path].sum() - 0.25 * moves.sum())
-
-    most = max(gathered(path) for path in itertools.product(range(3), repeat=len(score)))
-    assert gathered(tuple(best_chain(score, 0.25).tolist())) == pytest.approx(most)
 
 
 def test_rows_are_averaged_as_by_scipy() -> None:
