@@ -1,4 +1,4 @@
-"""Around the width: spatter, calibration, gauge R&R and laser stripes, each on known truth.
+"""Around the width: spatter, flaws, calibration, gauge R&R and laser stripes, on known truth.
 
 The drops that people marked on real photos come in where the data are (SEAMLOG_DATA).
 """
@@ -23,9 +23,11 @@ from seamlog.analysis.calibration.board import Board
 from seamlog.analysis.calibration.plane import Placing, calibrate_plane
 from seamlog.analysis.calibration.synthetic import View, render_board
 from seamlog.analysis.gauge.anova import gauge_rr
+from seamlog.analysis.surface.candidates import find_candidates
 from seamlog.analysis.surface.profile import profile_figures
 from seamlog.analysis.surface.spatter import find_spatter, plate_mask
 from seamlog.analysis.surface.stripe import find_stripe
+from seamlog.analysis.surface.synthetic_flaws import KINDS, Flawed, flawed
 from seamlog.analysis.surface.synthetic_spatter import Spattered, matched, spattered
 from seamlog.analysis.surface.synthetic_stripe import (
     HEIGHT_MM,
@@ -39,6 +41,8 @@ from seamlog.errors import SeamlogError
 
 PLAIN = Scene(noise=2)
 TEXTURED = Scene(noise=2, texture=8, haz=35, gradient=0.4)
+RIPPLED = Scene(noise=2, ripple=18, scallop_mm=0.12)
+GLEAMING = Scene(noise=2, ripple=12, specular=1)
 HARD = Scene(
     noise=3, blur_px=1.3, texture=8, haz=30, gradient=0.4, ripple=15, scallop_mm=0.1, specular=1,
     dark_toe=25, perspective=1,
@@ -119,6 +123,51 @@ def human_spatter_figures() -> list[Figure]:
         Figure("spatter, people's polygons: drops on the plate", marked, ""),
         Figure("spatter, people's polygons: recall", hit / marked, ""),
         Figure("spatter, people's polygons: precision", good / max(found, 1), ""),
+    ]
+
+
+def candidate_figures(seeds: int) -> list[Figure]:
+    """Flaws that are among the candidates, two of each kind a photo, and strangers among them."""
+    found = []
+    scenes = {"plain": PLAIN, "rippled": RIPPLED, "gleaming": GLEAMING, "textured": TEXTURED,
+              "hard": HARD}  # fmt: skip
+    for name, scene in scenes.items():
+        for dark in (55.0, 25.0):
+            rates = _shown([flawed(scene, KINDS * 2, seed, dark) for seed in range(seeds)])
+            label = f"candidates, {name}: {dark:.0f} grey levels"
+            found += [Figure(f"{label}: {kind} shown", rate, "%") for kind, rate in rates.items()]
+        sound = [flawed(scene, (), seed) for seed in range(seeds)]
+        strange = [len(find_candidates(case.photo, case.plane, case.bead)) for case in sound]
+        found.append(Figure(f"candidates, {name}: of a sound bead", float(np.mean(strange)), ""))
+    return found
+
+
+def _shown(cases: list[Flawed]) -> dict[str, float]:
+    """Percent of the flaws of each kind that are among the candidates of their photo."""
+    hits: dict[str, list[bool]] = {kind: [] for kind in KINDS}
+    for case in cases:
+        rows = find_candidates(case.photo, case.plane, case.bead)
+        for flaw in case.flaws:
+            mine = (row for row in rows if row.kind == flaw.kind)
+            hits[flaw.kind].append(any(flaw.is_at(row.x_px, row.y_px) for row in mine))
+    return {kind: 100 * float(np.mean(each)) for kind, each in hits.items()}
+
+
+def real_candidate_figures() -> list[Figure]:
+    """Candidates on real photos, about which nobody said what they are."""
+    folder = Path(os.environ.get("SEAMLOG_DATA", "../shared/data")) / "bead_contours"
+    counts = []
+    for path in sorted(folder.glob("*.jpg")):
+        photo = load_photo(path)
+        plane = plane_of(photo, None)
+        bead = measure_strip(photo, plane)
+        if bead.trusted:
+            counts.append(len(find_candidates(photo, plane, bead)))
+    if not counts:
+        return []
+    return [
+        Figure("candidates on trusted real photos, mean", float(np.mean(counts)), ""),
+        Figure("candidates on trusted real photos, most", max(counts), ""),
     ]
 
 
@@ -219,6 +268,7 @@ if __name__ == "__main__":
     given = options(__doc__)
     seeds = 2 if given.quick else 10
     tell("Spatter", spatter_figures(seeds) + human_spatter_figures(), given.json)
+    tell("Candidates", candidate_figures(seeds) + real_candidate_figures(), given.json)
     tell("Calibration", calibration_figures(seeds), given.json)
     tell("Gauge R&R", gauge_figures(4 if given.quick else 10), given.json)
     tell("Laser stripe", stripe_figures(2 * seeds), given.json)

@@ -195,7 +195,9 @@ def _sampled(values: Grid, x: Grid, y: Grid) -> Grid:
 def _half_radius(rays: NDArray[np.floating], core: Floats, level: Floats, place: Floats) -> Floats:
     """Where the mean over all directions has lost half its contrast, in candidate radii."""
     profile = _mean(np.swapaxes(rays, 1, 2), axis=2)
-    left = (profile - level[:, None]) / (core - level)[:, None]
+    # Without contrast there is no half of it: NaN, which is not below.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        left = (profile - level[:, None]) / (core - level)[:, None]
     below = left < 0.5
     first = np.argmax(below, axis=1)
     return np.where(below.any(axis=1), place[first], 0.0)

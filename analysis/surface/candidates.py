@@ -9,13 +9,15 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from seamlog.analysis.bead.image import Photo
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead.plane import Plane
 
 from .blobs import Grid, find_blobs
-from .spatter import bead_mask
+from .cracks import find_cracks
+from .straightened import StraightBead, straightened
 
 Floats = NDArray[np.float64]
 
@@ -23,11 +25,11 @@ MOST = 6
 """Candidates of one kind that are shown, the most striking first."""
 _PORE_SCORE = 7.0
 _PORE = (0.03, 0.2)
-_CRACK_LENGTH = 0.3
-_CRACK_ASPECT = 5.0
-_CRACK_STRENGTH = 1.6
-"""Depth against what ripples alone reach."""
 _UNDERCUT_LENGTH = 0.5
+_SHADOW, _PLATE = (0.02, 0.12), (0.3, 0.6)
+"""Where undercut lies and where the plate is looked at, in widths outside a toe."""
+_ALONG = 0.08
+"""Widths along a toe (Gaussian sigma) over which its shadow is averaged."""
 _TILE_PX = 160
 
 
@@ -44,16 +46,11 @@ class Candidate:
 
 def find_candidates(photo: Photo, plane: Plane, bead: BeadMeasurement) -> list[Candidate]:
     """Candidates of each kind, the most striking first."""
-    width_px = float(np.nanmedian(bead.width)) / bead.unit_per_px
     light = np.ascontiguousarray(photo.opponent()[..., 0])
-    reach = int(max(2, 0.06 * width_px))
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    inner = np.asarray(cv2.erode(bead_mask(photo, bead).astype(np.uint8), kernel) > 0)
-    found = [
-        *_pores(light, inner, width_px),
-        *_cracks(light, inner, width_px),
-        *_undercut(light, plane, bead),
-    ]
+    found = _undercut(light, plane, bead)
+    straight = straightened(photo, plane, bead)
+    if straight is not None:
+        found = [*_pores(straight), *_cracks(straight), *found]
     return [_placed(bead, *item) for item in found]
 
 
@@ -69,43 +66,21 @@ def _best(found: _Found) -> _Found:
     return sorted(found, key=lambda item: -item[3])[:MOST]
 
 
-def _pores(light: Grid, inner: NDArray[np.bool_], width_px: float) -> _Found:
-    low, high = (max(1.5, part * width_px / 2) for part in _PORE)
-    blobs = find_blobs(light, inner, low, high)
-    dark = (blobs.contrast < 0) & (blobs.score > _PORE_SCORE)
-    chosen = blobs.chosen(dark)
-    rows = zip(chosen.x_px, chosen.y_px, chosen.score, strict=True)
-    return _best([("pore", float(x), float(y), float(score)) for x, y, score in rows])
-
-
-def _cracks(light: Grid, inner: NDArray[np.bool_], width_px: float) -> _Found:
-    """Thin dark lines: what closing with a small disc fills, as long narrow pieces."""
-    size = 2 * int(max(2, 0.03 * width_px)) + 1
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    depth = np.asarray(cv2.morphologyEx(light, cv2.MORPH_BLACKHAT, disc)) * inner
-    known = depth[inner]
-    if not known.size:
-        return []
-    limit = float(np.median(known)) + 6 * 1.4826 * float(
-        np.median(np.abs(known - np.median(known)))
+def _pores(straight: StraightBead) -> _Found:
+    low, high = (max(1.5, part * straight.width / 2) for part in _PORE)
+    blobs = find_blobs(straight.light, straight.inside, low, high)
+    chosen = blobs.chosen((blobs.contrast < 0) & (blobs.score > _PORE_SCORE))
+    rows = zip(chosen.y_px, chosen.x_px, chosen.score, strict=True)
+    return _best(
+        [("pore", *straight.to_px(row, column), float(score)) for row, column, score in rows]
     )
-    count, labels, stats, _ = cv2.connectedComponentsWithStats((depth > limit).astype(np.uint8))
-    found: _Found = []
-    for piece in range(1, count):
-        left, top, wide, high, area = (int(value) for value in stats[piece])
-        if max(wide, high) < _CRACK_LENGTH * width_px:
-            continue
-        rows, columns = np.nonzero(labels[top : top + high, left : left + wide] == piece)
-        length = float(np.hypot(wide, high))
-        if length * length / area < _CRACK_ASPECT:
-            continue
-        strength = float(depth[rows + top, columns + left].mean()) / max(limit, 1.0)
-        if strength < _CRACK_STRENGTH:
-            continue
-        found.append(
-            ("crack", columns.mean() + left, rows.mean() + top, strength * length / width_px)
-        )
-    return _best(found)
+
+
+def _cracks(straight: StraightBead) -> _Found:
+    return _best(
+        [("crack", *straight.to_px(row, column), score)
+         for row, column, score in find_cracks(straight)]
+    )  # fmt: skip
 
 
 def _undercut(light: Grid, plane: Plane, bead: BeadMeasurement) -> _Found:
@@ -115,28 +90,32 @@ def _undercut(light: Grid, plane: Plane, bead: BeadMeasurement) -> _Found:
     for toe in (bead.left_px, bead.right_px):
         outwards = plane.to_plane(toe) - plane.to_plane(bead.centre_px)
         outwards /= np.maximum(np.hypot(*outwards.T), 1e-9)[:, None]
-        beyond = np.linspace(0.0, 0.12, 7)[1:] * usual
-        places = plane.to_plane(toe)[:, None] + beyond[None, :, None] * outwards[:, None]
-        px = plane.to_px(places.reshape(-1, 2)).reshape(*places.shape)
-        shadow = _sampled(light, px).mean(axis=1)
-        far = plane.to_plane(toe) + 0.4 * usual * outwards
-        plate = _sampled(light, plane.to_px(far)[:, None])[:, 0]
+        shadow, plate = (
+            _beside(light, plane, toe, outwards, np.array(zone) * usual)
+            for zone in (_SHADOW, _PLATE)
+        )
         found += _dark_runs(plate - shadow, toe, bead, usual)
     return _best(found)
 
 
-def _sampled(light: Grid, px: Floats) -> Floats:
+def _beside(light: Grid, plane: Plane, toe: Floats, outwards: Floats, zone: Floats) -> Floats:
+    """Mean lightness from `zone[0]` to `zone[1]` outside each station's toe."""
+    away = np.linspace(zone[0], zone[1], 8)
+    places = plane.to_plane(toe)[:, None] + away[None, :, None] * outwards[:, None]
+    px = plane.to_px(places.reshape(-1, 2)).reshape(*places.shape)
     at = np.nan_to_num(px, nan=-1.0).astype(np.float32)
     sampled = cv2.remap(
         light, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    return np.asarray(sampled, dtype=np.float64)
+    return np.asarray(sampled.mean(axis=1), dtype=np.float64)
 
 
 def _dark_runs(depth: Floats, toe: Floats, bead: BeadMeasurement, usual: float) -> _Found:
     good = bead.good
     if good.sum() < 10:
         return []
+    station = float(bead.s[-1] - bead.s[0]) / (len(bead.s) - 1)
+    depth = gaussian_filter1d(depth, _ALONG * usual / station, mode="nearest")
     middle = float(np.median(depth[good]))
     spread = 1.4826 * float(np.median(np.abs(depth[good] - middle))) + 1.0
     dark = good & (depth > middle + 3 * spread) & (depth > 0)

@@ -45,9 +45,9 @@ def spattered(scene: Scene, drops: int, seed: int) -> Spattered:
             reach = radius / scene.mm_per_px
             _draw(picture, x, y, reach, grey)
             found.append((x, y, reach, grey))
-    photo = _photographed(picture, scene, rng)
+    photo = photographed(picture, scene, rng)
     measured = measure_strip(photo, plane, bare.wandering_path(seed=seed))
-    clean = _photographed(bare.pixels.astype(np.float64), scene, rng)
+    clean = photographed(bare.pixels.astype(np.float64), scene, rng)
     return Spattered(photo, plane, measured, np.array(found).reshape(-1, 4), clean)
 
 
@@ -58,7 +58,8 @@ def _draw(picture: NDArray[np.float64], x: float, y: float, radius: float, grey:
     patch += grey * np.clip(radius + 0.5 - np.hypot(columns + left - x, rows + top - y), 0, 1)
 
 
-def _photographed(picture: NDArray[np.float64], scene: Scene, rng: np.random.Generator) -> Photo:
+def photographed(picture: NDArray[np.float64], scene: Scene, rng: np.random.Generator) -> Photo:
+    """A picture as the scene's camera takes it: blurred, with noise, 8 bit."""
     blurred = cv2.GaussianBlur(picture, (0, 0), scene.blur_px)
     noisy = blurred + scene.noise * rng.standard_normal(blurred.shape)
     return make_photo(np.clip(np.rint(noisy), 0, 255).astype(np.uint8), "plate")
