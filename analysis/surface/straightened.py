@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from seamlog.analysis.bead.curve import Centreline, arc_length, fit_centreline
+from seamlog.analysis.bead.curve import Centreline, fit_centreline
 from seamlog.analysis.bead.image import Photo
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead.plane import Plane
@@ -24,6 +25,8 @@ _USUAL = 1.5
 """Widths along the bead over which what is usual at a place across it is taken."""
 _GLEAM = 0.25
 """Widths across that a gleam takes at most: the usual is what is beside it, so gaps in it are."""
+_KNOWN = 0.3
+"""Part of those rows that must be bead."""
 _UNKNOWN = 1e9
 _MARGIN = 0.06
 """Part of the width beside each toe that is left out."""
@@ -84,12 +87,11 @@ def _between_toes(
     line: Centreline,
 ) -> NDArray[np.bool_]:
     """Samples between the toes, less a margin."""
-    s = arc_length(path) * (line.s[-1] / max(float(arc_length(path)[-1]), 1e-9))
-    rows = np.clip(np.searchsorted(line.s, s), 0, len(line.s) - 1)
+    rows = np.maximum.accumulate(cKDTree(line.points).query(path)[1])
     sides = []
     for toe in (bead.left_px[known], bead.right_px[known]):
         away = ((plane.to_plane(toe) - line.points[rows]) * line.normals[rows]).sum(axis=1)
-        sides.append(np.interp(line.s, s, away))
+        sides.append(np.interp(line.s, line.s[rows], away))
     low, high = np.minimum(*sides), np.maximum(*sides)
     margin = _MARGIN * float(np.median(high - low)) + strip.step
     across = strip.offsets[None]
@@ -97,19 +99,21 @@ def _between_toes(
 
 
 def _usual(light: Floats, window: int) -> Floats:
-    """Median along the bead over `window` rows, per column; huge where nothing is known."""
+    """Median along the bead over `window` rows, per column; huge where it is not known near by."""
     rows, columns = light.shape
     half = max(1, min(window, rows) // 2)
-    places = np.arange(half, rows - half + 1, max(1, half // 2)) if rows > 2 * half else [rows // 2]
+    places = np.arange(half, max(rows - half, half) + 1, max(1, half // 2))
     found = np.full((len(places), columns), np.nan)
     for number, place in enumerate(places):
         part = light[max(0, place - half) : place + half]
-        some = np.isfinite(part).mean(axis=0) > 0.3
+        some = np.isfinite(part).mean(axis=0) > _KNOWN
         found[number, some] = np.nanmedian(part[:, some], axis=0)
     at = np.arange(rows)
+    nearest = np.abs(at[:, None] - places).argmin(axis=1)
     usual = np.full(light.shape, _UNKNOWN)
     for column in range(columns):
         some = np.isfinite(found[:, column])
         if some.any():
-            usual[:, column] = np.interp(at, np.asarray(places)[some], found[some, column])
+            near = some[nearest]
+            usual[near, column] = np.interp(at[near], places[some], found[some, column])
     return usual
