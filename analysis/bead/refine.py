@@ -44,6 +44,8 @@ _RASTER_PX = 0.02
 """Standard uncertainty that the raster and the unknown shape of the blur leave at the longest."""
 _SHARP_PX = 2.0
 """Blur up to which a toe is not looked at twice."""
+_LEAST_SMOOTHING = 1.0
+"""Stations (Gaussian sigma) from which on a smoothing of stations is a Gaussian."""
 _MOST_SMEARED = 2.5
 """Waviness that was lost, in parts of what one more smoothing takes, at most."""
 _ENOUGH = 64
@@ -162,20 +164,27 @@ class _Side:
     def _smeared(self, places: EdgePlaces, share: float) -> float:
         """Px of the toe's own waviness that blur and averaging take away, rms.
 
-        One more smoothing takes less than they did, by as much as yet another one takes less
-        than it. Giving it back by deconvolution was tried: on a textured plate it amplifies more
-        noise than it restores.
+        One more smoothing leaves the part `left` of what it takes to a second one: that of a wave
+        of one length, of which the own smoothing left a part as well. Stations sample no smoothing
+        finer than themselves, so this one may be broader than the own. Giving back what was lost
+        by deconvolution was tried: on a textured plate it amplifies more noise than it restores.
         """
-        averaged = share * self._longest
-        sigma = np.hypot(places.blur_px / self._row_px, averaged)
-        taken = places.column - _slow(places.column, sigma / self._every)
-        again = _slow(taken, sigma / self._every)
-        wide, noise = (sigma / averaged) ** 2, float(np.median(places.u_noise)) ** 2
-        first = float(np.var(taken)) - noise * _passed(0, wide)
-        second = float(np.var(again)) - noise * _passed(1, wide)
+        averaged = share * self._longest / self._every
+        own = float(np.hypot(places.blur_px / self._row_px / self._every, averaged))
+        broad = max(own, _LEAST_SMOOTHING)
+        taken = places.column - _slow(places.column, broad)
+        again = _slow(taken, broad)
+        noise = float(np.median(places.u_noise)) ** 2
+        first, second = (
+            float(np.var(values)) - noise * _passed(times, broad, averaged)
+            for times, values in enumerate((taken, again))
+        )
         if first <= 0 or second <= 0:
             return 0.0
-        return float(np.sqrt(first * np.clip(first / second, 1.0, _MOST_SMEARED**2)))
+        left = min(float(np.sqrt(second / first)), 0.999)
+        kept = left ** ((own / broad) ** 2)
+        lost = (1 - kept) / (kept * (1 - left))
+        return float(np.sqrt(first) * min(lost, _MOST_SMEARED))
 
     def _averaging(self, near: Floats, model: EdgeModel) -> float:
         """Part of the longest averaging with the least expected error (Stein's estimate).
@@ -218,14 +227,19 @@ def _slow(values: Floats, sigma: float) -> Floats:
     return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
 
 
-def _passed(smoothings: int, wide: float) -> float:
-    """Part of averaged noise that a smoothing takes after others `wide` times as much in square."""
-    before = smoothings * wide
-    return float(
-        1 / np.sqrt(1 + before)
-        - 2 / np.sqrt(1 + before + wide / 2)
-        + 1 / np.sqrt(1 + before + wide)
-    )
+def _passed(times: int, sigma: float, averaged: float) -> float:
+    """Part of the variance of noise, averaged before, that a smoothing takes after `times` others.
+
+    Sigmas in samples.
+    """
+    reach = 4 * int(np.ceil((times + 2) * sigma)) + 1
+    one = np.zeros(2 * reach + 1)
+    one[reach] = 1.0
+    for _ in range(times):
+        one = _slow(one, sigma)
+    taken = one - _slow(one, sigma)
+    alike = np.exp(-0.25 * (np.arange(-2 * reach, 2 * reach + 1) / averaged) ** 2)
+    return float(np.convolve(taken, taken[::-1]) @ alike)
 
 
 def _mixed(pixels: Signal, direction: Floats) -> Signal:

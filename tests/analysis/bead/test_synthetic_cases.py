@@ -1,6 +1,7 @@
 """Widths of rendered beads against their exact truth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -114,3 +115,19 @@ def test_stations_lie_a_quarter_millimetre_apart(measure_case: MeasureCase) -> N
     steps = np.hypot(*np.diff(centre_mm, axis=0).T)[20:-20]
     assert np.diff(measured.result.s) == pytest.approx(0.25)
     assert np.median(steps) == pytest.approx(0.25, abs=0.01)
+
+
+@pytest.mark.parametrize("mm_per_px", [0.1, 0.05])
+def test_what_averaging_takes_of_ripples_is_in_the_uncertainty(mm_per_px: float) -> None:
+    """Scalloped toes 0.9 mm long: what is lost of them is several times the noise."""
+    scene = replace(CASES["ripple"], width_px=1024, height_px=512, mm_per_px=mm_per_px)
+    bead = render(scene, 1)
+    photo = make_photo(bead.pixels, "ripple")
+    plane = plane_of(photo, bead.calibration)
+    result = measure_strip(photo, plane, bead.wandering_path(seed=1))
+    centre_mm = plane.to_plane(result.centre_px)
+    inside = (centre_mm[:, 0] > 3) & (centre_mm[:, 0] < 1024 * mm_per_px - 3)
+    error = (result.width - bead.width_at_mm(bead.seam_s_mm(centre_mm)))[inside]
+    u = result.u_width[inside]
+    assert (np.abs(error) <= 1.96 * u).mean() > 0.8
+    assert (np.abs(error) <= 5 * u).all()
