@@ -89,6 +89,8 @@ def find_overlap(
     """How two photos of one bead overlap; `EvidenceError` where that cannot be told."""
     if first.unit != second.unit:
         raise EvidenceError("one has a calibration, the other has none: there is no common scale")
+    if first.unit == "px" and not (first.trusted and second.trusted):
+        raise EvidenceError("without calibration only beads that can be trusted are stitched")
     matrix = match_photos(photos[1], photos[0])
     seen = _by_marks(first, second, matrix) if matrix is not None else None
     if seen is None and first.unit == "px":

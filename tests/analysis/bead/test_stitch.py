@@ -64,6 +64,8 @@ def test_photos_that_share_nothing_are_not_stitched(bead: SyntheticBead) -> None
     with pytest.raises(EvidenceError, match="no common scale"):
         stitch((first, second), (replace(left, unit="px"), right))
     bare = [replace(each, unit="px") for each in (left, right)]
+    with pytest.raises(EvidenceError, match="only beads that can be trusted"):
+        stitch((first, second), (bare[0], replace(bare[1], confidence=0.4)))
     with pytest.raises(EvidenceError, match="only marks that both photos show"):
         stitch((first, second), bare)
 
