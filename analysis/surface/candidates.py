@@ -130,12 +130,14 @@ def _dark_runs(depth: Floats, toe: Floats, bead: BeadMeasurement, usual: float) 
 
 
 def contact_sheet(photo: Photo, candidates: list[Candidate], reach_px: float) -> NDArray[np.uint8]:
-    """Numbered crops of all candidates, each `2 reach_px` wide; uint8 BGR."""
-    picture = photo.as_bgr8()
-    side = 2 * int(reach_px) + 1
+    """Numbered crops of all candidates, `2 reach_px` wide, black beside the photo; uint8 BGR."""
+    reach = int(reach_px)
+    side, frame = 2 * reach + 1, (reach + 1,) * 4
+    picture = cv2.copyMakeBorder(photo.as_bgr8(), *frame, cv2.BORDER_CONSTANT)
     tiles = []
     for number, item in enumerate(candidates, 1):
-        crop = cv2.getRectSubPix(picture, (side, side), (item.x_px, item.y_px))
+        middle = (item.x_px + reach + 1, item.y_px + reach + 1)
+        crop = cv2.getRectSubPix(picture, (side, side), middle)
         tile = cv2.resize(crop, (_TILE_PX, _TILE_PX), interpolation=cv2.INTER_AREA)
         text = f"{number} {item.kind}"
         for colour, thick in (((0, 0, 0), 3), ((255, 255, 255), 1)):

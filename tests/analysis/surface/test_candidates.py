@@ -76,3 +76,10 @@ def test_the_contact_sheet_shows_each() -> None:
     sheet = contact_sheet(case.photo, found, 20.0)
     assert sheet.dtype == np.uint8
     assert sheet.shape == (160, 160 * len(found), 3)
+
+
+def test_what_is_beside_the_photo_is_black_on_the_sheet() -> None:
+    photo = make_photo(np.full((60, 80), 200, np.uint8), "grey")
+    sheet = contact_sheet(photo, [Candidate("pore", 0.0, 30.0, 0.0, 9.0)], 20.0)
+    assert (sheet[80:, :60] == 0).all()
+    assert (sheet[80:, 90:] == 200).all()
