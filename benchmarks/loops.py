@@ -1,5 +1,6 @@
 """What a live loop calls to log: ours, the `mcap` package, foxglove-sdk, and nothing at all."""
 
+import mmap
 import struct
 import time
 from collections.abc import Callable
@@ -17,6 +18,8 @@ from seamlog.recorder import Recorder
 
 TOPIC, PICTURES = "/table/reference", "/camera/image"
 PAYLOAD = struct.Struct("<I" + layout(TOPIC).codes)
+COPIES_BYTES = 128 << 20
+"""As much shared memory as the recorder takes for pictures."""
 Picture: TypeAlias = np.ndarray[Any, Any]
 
 
@@ -38,6 +41,22 @@ def jpeg(image: Picture) -> bytes:
 def no_loop(_stack: ExitStack, _folder: Path) -> Loop:
     """An empty control."""
     return Loop(lambda _t, _a, _b, _c: None, lambda _t, _image: None, lambda _t, _data: None)
+
+
+def copying_loop(_stack: ExitStack, _folder: Path) -> Loop:
+    """A control that copies each picture into shared memory and does nothing else."""
+    flags = mmap.MAP_SHARED | mmap.MAP_ANONYMOUS | mmap.MAP_POPULATE
+    room = memoryview(mmap.mmap(-1, COPIES_BYTES, flags))
+    place = 0
+
+    def copied(_t: int, image: Picture) -> None:
+        nonlocal place
+        pixels = memoryview(image).cast("B")
+        place = place if place + len(pixels) <= len(room) else 0
+        room[place : place + len(pixels)] = pixels
+        place += len(pixels)
+
+    return Loop(lambda _t, _a, _b, _c: None, copied, lambda _t, _data: None)
 
 
 def own_loop(stack: ExitStack, folder: Path, is_lent: bool = False) -> Loop:

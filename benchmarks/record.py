@@ -1,7 +1,8 @@
 """Recording beside mcap and foxglove-sdk on the same data: what the live loop pays, and the file.
 
 Data: messages of 36 bytes (stamp + 3 doubles), pictures of 640 x 480 in colour and grey, JPEGs of
-30 kB. Paced: 1 kHz encoder + 30 fps, always beside an empty loop. Peers write in the loop, as their
+30 kB. Paced: 1 kHz encoder + 30 fps, always beside an empty loop
+and one that only copies its pictures. Peers write in the loop, as their
 users do, and make JPEGs of raw pictures there.
 """
 
@@ -22,6 +23,7 @@ from loops import (
     TOPIC,
     Loop,
     Picture,
+    copying_loop,
     foxglove_loop,
     mcap_loop,
     no_loop,
@@ -140,13 +142,14 @@ def paced_beside_peers(
     rows: dict[str, Latencies] = {}
     makers: dict[str, Callable[[ExitStack, Path], Loop]] = {
         "empty": no_loop,
+        "copy alone": copying_loop,
         "seamlog": own_loop,
         "seamlog, lent": partial(own_loop, is_lent=True),
         "mcap": mcap_loop,
         "foxglove-zstd": foxglove_loop,
     }
     if isinstance(images[0], bytes):
-        del makers["seamlog, lent"]
+        del makers["copy alone"], makers["seamlog, lent"]
     for name, make in makers.items():
         with optional_peer(name), ExitStack() as stack:
             loop = make(stack, folder)

@@ -89,7 +89,7 @@ class Producer(ABC):
 
         Lent until something is logged on this channel, one at a time; what was logged may be
         read for a while and not written again. Other memory, which `log_frame` copies, where the
-        ring has no room. `ValueError` if `shape` is none.
+        ring has no room. `ValueError` if `shape` is none that a picture may have.
         """
         channel = self._mine.channels.get(topic) or self._late_channel(topic)
         return np.empty(shape, np.uint8) if channel is None else channel.loan_frame(shape)

@@ -111,8 +111,9 @@ def define_channels(rings: Rings, file: RecoveredFile) -> None:
 def drain(rings: Rings, file: RecoveredFile, missing: Mapping[int, int]) -> dict[int, Account]:
     """Write what the rings hold behind what `file` has, and the final accounts.
 
-    The rings stay as they are until the session is safe: a copy is drained. `missing` are
-    sequences by channel id that the file skips: dropped while recording, or lost by damage.
+    `define_channels` has told the file of theirs. The rings stay as they are until the session is
+    safe: a copy is drained. `missing` are sequences by channel id that the file skips: dropped
+    while recording, or lost by damage.
     """
     with _copied(rings.folder) as folder:
         feeds = list(_take_items(folder, file))

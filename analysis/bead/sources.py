@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seamlog.calibration import Calibration, load_calibration, parse_calibration
-from seamlog.errors import ImageError, InputError
+from seamlog.errors import InputError, SeamlogError
 from seamlog.results import Input, input_of
 
 from .image import Photo, decode_photo, load_photo
@@ -69,17 +69,20 @@ def logged_seam_mm(session: "Session") -> Points | None:
 
 
 def frame_before(session: "Session", arc_on_ns: int) -> Before | None:
-    """The log's last camera picture from before the arc; None without a whole one."""
+    """The log's last camera picture from before log time `arc_on_ns`; None without a whole one.
+
+    Nobody asked for it, so a picture that cannot be read is none.
+    """
     if FRAMES not in session.info.channels:
         return None
-    frames = session.frames()
-    earlier = np.flatnonzero(frames.stamps_ns < arc_on_ns)
-    if not len(earlier):
-        return None
-    last = int(earlier[np.argmax(frames.stamps_ns[earlier])])
     try:
-        return Before(decode_photo(frames[last].data, frames[last].where), was_named=False)
-    except ImageError:
+        frames = session.frames()
+        count = int(np.searchsorted(frames.log_times_ns, arc_on_ns))
+        if not count:
+            return None
+        last = frames[count - 1]
+        return Before(decode_photo(last.data, last.where), was_named=False)
+    except SeamlogError:
         return None
 
 

@@ -38,7 +38,7 @@ _ROUND = 0.6
 
 
 def find_cracks(bead: StraightBead) -> list[tuple[float, float, float]]:
-    """Row, column and score of each line's middle."""
+    """Row and column of each line's middle in the straightened bead, and its score in scatters."""
     length = max(7.0, _LINE * bead.width)
     breadth = max(_LEAST_PX, _BREADTH * bead.width)
     angles = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS

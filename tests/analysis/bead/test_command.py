@@ -6,7 +6,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
+from seamlog.analysis.bead.sources import frame_before
 from seamlog.analysis.bead.synthetic import Scene, render
 from seamlog.analysis.surface.synthetic_spatter import spattered
 from seamlog.channels import ARC_OFF, ARC_ON
@@ -14,6 +16,7 @@ from seamlog.cli import ExitCode, main
 from seamlog.clock import SIMULATED_EPOCH_NS, SimulatedClock
 from seamlog.recorder import Recorder
 from seamlog.results import Results, Verdict
+from seamlog.session import open_session
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -170,3 +173,21 @@ def test_marks_on_a_picture_of_the_log_from_before_the_arc_do_not_count(
     assert counts["photo alone"] == pytest.approx(len(case.drops), abs=4)
     assert counts["plate in the log"] <= 2
     assert counts["something else in the log"] == counts["photo alone"]
+
+
+def test_frames_that_cannot_be_read_are_no_picture_from_before(tmp_path: Path) -> None:
+    with open_session(recorded_with(np.full((60, 80), 90, np.uint8), tmp_path / "w.mcap")) as whole:
+        found = frame_before(whole, SIMULATED_EPOCH_NS + 10**9)
+        assert found is not None
+        assert found.photo.pixels.shape == (60, 80)
+        assert frame_before(whole, SIMULATED_EPOCH_NS) is None
+    foreign = tmp_path / "foreign.mcap"
+    with foreign.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("sensor_msgs/msg/Image", "ros2msg", b"uint8[] data")
+        channel = writer.register_channel("/camera/image", "cdr", schema)
+        writer.add_message(channel, 1, b"\0\1\0\0" + bytes(8), 1)
+        writer.finish()  # type: ignore[no-untyped-call]
+    with open_session(foreign) as session:
+        assert frame_before(session, 2) is None
