@@ -16,6 +16,7 @@ from .image import Photo
 from .plane import Plane, Points
 from .refine import averaged_at, columns_of_change
 from .sampling import sample_rows, sample_strip
+from .series import median
 from .width import Toes
 from .zones import fisher_direction
 
@@ -57,7 +58,7 @@ def band_inside(
     rows = (np.arange(band.first, band.last + 1) * _ALONG).clip(0, len(line.s) - 1)
     offsets = strip.offset((band.left + band.right) / 2 - 0.5)
     points = line.points[rows] + offsets[:, None] * line.normals[rows]
-    return points, float(np.median(band.right - band.left)) / 2 * step
+    return points, median(band.right - band.left) / 2 * step
 
 
 def softness(
@@ -68,7 +69,7 @@ def softness(
     The median over the stations of `line`; a change without an end within a fifth of the half
     width counts as far as that.
     """
-    half_px = float(np.median(toes[1].offset - toes[0].offset)) / 2 / unit
+    half_px = median(toes[1].offset - toes[0].offset) / 2 / unit
     reach = int(max(6, 0.2 * half_px))
     sides = []
     for side, toe in ((-1, toes[0]), (1, toes[1])):
@@ -91,7 +92,7 @@ def flank_texture(
 
     Of both toes the greater; 0 for a toe beyond which no plate is in the photo.
     """
-    width = float(np.median(toes[1].offset - toes[0].offset))
+    width = median(toes[1].offset - toes[0].offset)
     grey = np.ascontiguousarray(photo.opponent()[..., 0])
     reach_px = max(1.5, _REACH * width / unit)
     detail = np.abs(grey - cv2.GaussianBlur(grey, (0, 0), reach_px))
@@ -100,7 +101,7 @@ def flank_texture(
         places = [line.shifted(toe.offset + outward * away) for away in _FLANK * width / 2]
         x, y = np.rint(plane.to_px(np.concatenate(places))).astype(np.int64).T
         seen = (x >= 0) & (y >= 0) & (x < photo.width_px) & (y < photo.height_px)
-        return float(np.median(detail[y[seen], x[seen]])) + _ROUNDING if seen.any() else np.inf
+        return median(detail[y[seen], x[seen]]) + _ROUNDING if seen.any() else np.inf
 
     return max(
         typical(toe, -side) / typical(toe, side) for side, toe in zip((-1, 1), toes, strict=True)

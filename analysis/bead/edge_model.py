@@ -26,6 +26,7 @@ from .edge_shapes import (
     resolved,
     subspaces,
 )
+from .series import calmed
 
 Rows = NDArray[np.int64]
 
@@ -106,7 +107,7 @@ def _aligned(signal: Projected, centre: Rows, window: Window) -> tuple[Floats, F
     """Shift of each row's edge by a plain fit, calmed along the toe, and mean profiles."""
     profiles = profiles_at(signal, centre, window)
     first = even_ruler(window, 1.5, 2.5).places(profiles).shift
-    shift = gaussian_filter1d(first + centre, _CALM, mode="nearest") - centre
+    shift = calmed(first + centre, _CALM) - centre
     rows = spread(len(centre), _ROWS)
     return shift, aligned_means(profiles[rows], shift[rows])
 

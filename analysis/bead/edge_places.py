@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from .edge_model import EDGE_FLOOR, GREY_FLOOR, EdgeModel, aligned_means, profiles_at
-from .edge_shapes import Fit, Floats, Profiles, Ruler, Window, even_ruler, step_at
+from .edge_shapes import Floats, Profiles, Ruler, Window, even_ruler, step_at
+from .series import calmed, median
 
 _REACH = 4.0
 """Columns around where an edge is looked for."""
@@ -47,8 +47,8 @@ def locate_edges(signal: NDArray[np.float32], near: Floats, model: EdgeModel) ->
     shift = found.shift - _astray(plain, found.shift, model)
     return EdgePlaces(
         column=centre + shift,
-        within=_slow(np.abs(found.shift) > _REACH - 0.1, 2.0) < 0.6,
-        u_noise=random_u(found, model.window),
+        within=calmed(np.abs(found.shift) > _REACH - 0.1, 2.0) < 0.6,
+        u_noise=random_u(found.misfit, found.variance, model.window),
         u_model=np.full(len(near), model.u),
         height=_height(seen, shift, model.window, model.blur),
         bare=_height(plain, shift, model.window, model.blur),
@@ -71,7 +71,7 @@ def _whitening(plain: Profiles, model: EdgeModel) -> Floats:
     texture = plain - cv2.blur(plain, (1, _SLOW), borderType=cv2.BORDER_REPLICATE)
     lags = np.abs(np.subtract.outer(np.arange(len(at)), np.arange(len(at))))
     # over rows that lie together: NumPy takes twice as long over each short one
-    size = float(np.median(np.ptp(plain.T.copy(), axis=0)))
+    size = median(np.ptp(plain.T.copy(), axis=0))
     covariance = np.eye(len(at)) * (GREY_FLOOR + (EDGE_FLOOR * size) ** 2)
     step, clear = step_at(at, blur), 2.0 * blur + 1.5
     plate = at < -min(clear, window.outside - 2)
@@ -98,21 +98,17 @@ def _astray(plain: Profiles, shift: Floats, model: EdgeModel) -> float:
     Weights that are not even let what the shading has left pull at them; on means it is less.
     """
     means = aligned_means(plain, shift)
-    return -float(np.median(even_ruler(model.window, model.blur, 1.5).places(means).shift))
+    return -median(even_ruler(model.window, model.blur, 1.5).places(means).shift)
 
 
-def random_u(found: Fit, window: Window) -> Floats:
-    """Standard uncertainty of each shift; the misfit of some 30 rows tells the noise's size.
+def random_u(misfit: Floats, variance: Floats, window: Window) -> Floats:
+    """Standard uncertainty of each row's shift; the misfit of some 30 tells the noise's size.
 
     Means of logarithms, so that a drop of spatter in a few rows does not count for all.
     """
     freedom = max(window.size - 3, 1)
-    noise = np.exp(_slow(np.log(found.misfit), 15.0) + 1 / freedom) / freedom
-    return np.asarray(np.sqrt(np.exp(_slow(np.log(found.variance), 3.0)) * noise))
-
-
-def _slow(values: Floats | NDArray[np.bool_], sigma: float) -> Floats:
-    return np.asarray(gaussian_filter1d(values.astype(np.float64), sigma, mode="nearest"))
+    noise = np.exp(calmed(np.log(misfit), 15.0) + 1 / freedom) / freedom
+    return np.asarray(np.sqrt(np.exp(calmed(np.log(variance), 3.0)) * noise))
 
 
 def _height(profiles: Profiles, shift: Floats, window: Window, blur: float) -> Floats:
@@ -121,4 +117,4 @@ def _height(profiles: Profiles, shift: Floats, window: Window, blur: float) -> F
     rows, last = np.arange(len(shift)), profiles.shape[1] - 1
     inside = np.clip(np.rint(window.outside + shift + reach).astype(int), 0, last)
     outside = np.clip(np.rint(window.outside + shift - reach).astype(int), 0, last)
-    return _slow(profiles[rows, inside] - profiles[rows, outside], 3.0)
+    return calmed(profiles[rows, inside] - profiles[rows, outside], 3.0)

@@ -1,6 +1,6 @@
 """The plane a bead is measured in: millimetres by a calibration, or pixels without one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,12 @@ from seamlog.calibration import Calibration, Lens, PlaneCalibration, projected
 from seamlog.errors import CalibrationError
 
 from .image import Photo
+from .series import median
 
 Points = NDArray[np.float64]
+
+_SIDES = np.array([[-0.5, 0.0], [0.5, 0.0], [0.0, -0.5], [0.0, 0.5]])
+"""The middles of a pixel's left, right, upper and lower side, from its centre."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +34,11 @@ class Plane:
     in_table_frame: bool = False
     lens: Lens | None = None
     frame_u: float = 0.0
+    px_from_plane: NDArray[np.float64] = field(init=False, repr=False, compare=False)
+    """The inverse homography, shape (3, 3), to pixels freed from the lens's distortion."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "px_from_plane", np.linalg.inv(self.plane_from_px))
 
     def to_plane(self, points_px: Points) -> Points:
         """Plane coordinates of photo points, shape (n, 2)."""
@@ -38,7 +47,7 @@ class Plane:
 
     def to_px(self, points: Points) -> Points:
         """Photo pixels of plane points, shape (n, 2)."""
-        ideal = projected(self.px_from_plane(), points)
+        ideal = projected(self.px_from_plane, points)
         return self.lens.distorted(ideal) if self.lens else ideal
 
     def through_lens(self, x: NDArray[Any], y: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -48,17 +57,12 @@ class Plane:
         bent = self.lens.distorted(np.stack([x, y], axis=-1))
         return bent[..., 0], bent[..., 1]
 
-    def px_from_plane(self) -> NDArray[np.float64]:
-        """The inverse homography, shape (3, 3), to pixels freed from the lens's distortion."""
-        return np.asarray(np.linalg.inv(self.plane_from_px), dtype=np.float64)
-
     def unit_per_px(self, points_px: Points) -> float:
         """Median length of a pixel at these photo points: the root of its area in the plane."""
-        half_x, half_y = np.array([0.5, 0.0]), np.array([0.0, 0.5])
-        right = self.to_plane(points_px + half_x) - self.to_plane(points_px - half_x)
-        down = self.to_plane(points_px + half_y) - self.to_plane(points_px - half_y)
+        sides = self.to_plane((points_px + _SIDES[:, None]).reshape(-1, 2)).reshape(4, -1, 2)
+        right, down = sides[1] - sides[0], sides[3] - sides[2]
         area = np.abs(right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0])
-        return float(np.sqrt(np.median(area)))
+        return float(np.sqrt(median(area)))
 
 
 def plane_of(photo: Photo, calibration: Calibration | None) -> Plane:

@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from seamlog.errors import EvidenceError
 
@@ -18,6 +17,7 @@ from .edge_shapes import Window
 from .image import Photo
 from .plane import Plane
 from .sampling import sample_rows
+from .series import calmed, median
 from .width import Toes
 from .zones import fisher_direction
 
@@ -62,7 +62,7 @@ class Rough:
     @property
     def half(self) -> float:
         """Typical half width."""
-        return float(np.median(self.right - self.left)) / 2
+        return median(self.right - self.left) / 2
 
 
 def longest_px(half_px: float) -> float:
@@ -112,7 +112,7 @@ class _Side:
     ) -> None:
         half_px, row_px = rough.half / unit, float(line.s[1] - line.s[0]) / unit
         self._longest = longest_px(half_px) / row_px
-        toe = gaussian_filter1d(toe, _CALM * self._longest, mode="nearest")
+        toe = calmed(toe, _CALM * self._longest)
         self._rough, self._toe, self._side, self._unit = rough, toe, side, unit
         self._row_px, self._every = row_px, every
         self._pick = np.arange(every // 2, len(toe), every)
@@ -172,9 +172,9 @@ class _Side:
         averaged = share * self._longest / self._every
         own = float(np.hypot(places.blur_px / self._row_px / self._every, averaged))
         broad = max(own, _LEAST_SMOOTHING)
-        taken = places.column - _slow(places.column, broad)
-        again = _slow(taken, broad)
-        noise = float(np.median(places.u_noise)) ** 2
+        taken = places.column - calmed(places.column, broad)
+        again = calmed(taken, broad)
+        noise = median(places.u_noise) ** 2
         first, second = (
             float(np.var(values)) - noise * _passed(times, broad, averaged)
             for times, values in enumerate((taken, again))
@@ -197,7 +197,7 @@ class _Side:
         seen = profiles_at(signals, centre, model.window)
         plain = seen - model.shading[rows]
         found = ruler_for(plain[-1], model).places(plain)
-        noise = float(np.median(random_u(found, model.window)[-1])) ** 2
+        noise = median(random_u(found.misfit[-1], found.variance[-1], model.window)) ** 2
         return _least_risk(centre + found.shift, _SHARES, noise)
 
     def _toes(self, places: EdgePlaces, smeared: float, share: float, soft_px: float) -> Toes:
@@ -206,7 +206,7 @@ class _Side:
         beyond = column - 3 - 2 * places.blur_px
         outside = np.clip(np.rint(beyond).astype(int), 0, 2 * self._reach)
         inward = column - self._reach
-        followed = _slow(self._toe, share * self._longest)[self._pick]
+        followed = calmed(self._toe, share * self._longest)[self._pick]
         return Toes(
             offset=followed - self._side * self._unit * inward,
             u_noise=places.u_noise * self._unit,
@@ -223,10 +223,6 @@ class _Side:
         )
 
 
-def _slow(values: Floats, sigma: float) -> Floats:
-    return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
-
-
 def _passed(times: int, sigma: float, averaged: float) -> float:
     """Part of the variance of noise, averaged before, that a smoothing takes after `times` others.
 
@@ -236,8 +232,8 @@ def _passed(times: int, sigma: float, averaged: float) -> float:
     one = np.zeros(2 * reach + 1)
     one[reach] = 1.0
     for _ in range(times):
-        one = _slow(one, sigma)
-    taken = one - _slow(one, sigma)
+        one = calmed(one, sigma)
+    taken = one - calmed(one, sigma)
     alike = np.exp(-0.25 * (np.arange(-2 * reach, 2 * reach + 1) / averaged) ** 2)
     return float(np.convolve(taken, taken[::-1]) @ alike)
 
@@ -284,7 +280,7 @@ def columns_of_change(profiles: Signal) -> float:
     level = max(2, profiles.shape[1] // 8)
     change = np.abs(calm[:, :level].mean(axis=1) - calm[:, -level:].mean(axis=1))
     steepest = np.abs(np.gradient(calm, axis=1)).max(axis=1)
-    return float(np.median(change / np.maximum(steepest, 1e-3)))
+    return median(change / np.maximum(steepest, 1e-3))
 
 
 def _least_risk(places: Floats, shares: Floats, noise: float) -> float:

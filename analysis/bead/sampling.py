@@ -114,7 +114,7 @@ def _maps(
     plane: Plane, line: Centreline, first: NDArray[np.float64], step: float, count: int
 ) -> tuple[Floats, Floats]:
     """Photo coordinates of all samples: numerators and denominator are linear along a row."""
-    matrix = plane.px_from_plane()
+    matrix = plane.px_from_plane
     start = line.points + first[:, None] * line.normals
     base = start @ matrix[:, :2].T + matrix[:, 2]
     slope = step * line.normals @ matrix[:, :2].T

@@ -12,13 +12,14 @@ from .band import BandSearch
 from .confidence import soft_px
 from .core import band_inside, flank_texture, softness
 from .curve import Centreline, arc_length, fit_centreline
-from .features import smoothed, stack_texture, strip_features
+from .features import smoothed, strip_features
 from .image import Photo
 from .measurement import TOES, BeadMeasurement
 from .path import find_paths
 from .plane import Plane, Points
 from .refine import Rough, longest_px, refine_toes
 from .sampling import Strip, sample_strip
+from .series import calmed, median
 from .toes import Extent, find_toes, strip_look
 from .width import BandEvidence, Toes, assemble
 
@@ -38,8 +39,13 @@ _ASIDE = 0.03
 """How far beside the bead a given path may run, as a part of the columns looked at."""
 _ROWS_AVERAGED = 4.0
 """Rows in the longest averaging (Gaussian sigma) that are enough: neighbours tell the same."""
-_SECTIONS = 48
-"""Sections in which the band along a given path is looked for."""
+_PAST, _LOST = 2.0, 0.5
+"""Half widths that a path is longer than the bead, as only past its end can be seen that it ends,
+and that each tracing adds at the ends: a stiff curve loses as much when it is moved to the toes."""
+_COLUMNS, _SECTIONS = 60, 48
+"""Columns to each side of a given path, and sections, in which the band is looked for."""
+_AROUND = 8.0
+"""Half widths to each side of a given path that show a band well."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +133,7 @@ def _measure(
     unit = plane.unit_per_px(plane.to_px(found.points))
     traced = _traced(photo, plane, found.points, found.half, unit, tracing)
     band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit, tracing))
-    if band.inner:
+    if band.inner or band.sharper:
         flank = flank_texture(photo, plane, traced.line, traced.toes, unit)
         band = replace(band, flank=flank)
     return assemble(photo, plane, traced.line, traced.toes, unit, band, start)
@@ -137,12 +143,13 @@ def _traced(
     photo: Photo, plane: Plane, points: Points, half: float, unit: float, tracing: _Tracing
 ) -> _Traced:
     _refuse_narrow(photo, 2 * half / unit)
-    path = _extended(photo, plane, points, half)
+    path = points
     for freedom in tracing.freedoms:
+        path = _extended(photo, plane, path, half, _PAST if path is points else _LOST)
         strip, extent = _straighten(photo, plane, path, half, unit, freedom, tracing)
         middle = _middle(strip, extent)
         path = strip.line.shifted(middle)
-        half = float(np.median(extent.half)) * strip.step
+        half = median(extent.half) * strip.step
         _refuse_narrow(photo, 2 * half / unit)
     every, along = _row_step(plane, half, unit)
     line = fit_centreline(path, along, max(12.0 * half, 16 * unit))
@@ -172,12 +179,9 @@ def _sharper_inside(
     return min(softness(photo, plane, traced.line, traced.toes, unit)) / max(inside, 1.0)
 
 
-def _extended(photo: Photo, plane: Plane, path: Points, half: float) -> Points:
-    """The path with two half widths more at both ends, as far as the photo goes.
-
-    Only past its end can be seen that a bead ends.
-    """
-    beyond = np.arange(0.1, 2.01, 0.1)[:, None] * half
+def _extended(photo: Photo, plane: Plane, path: Points, half: float, by: float) -> Points:
+    """The path with `by` half widths more at both ends, as far as the photo goes."""
+    beyond = np.arange(0.1, by + 0.01, 0.1)[:, None] * half
     before = path[0] + beyond * _heading(path[::-1], 3 * half)
     after = path[-1] + beyond * _heading(path, 3 * half)
     before, after = (more[_in_photo(photo, plane.to_px(more))] for more in (before, after))
@@ -224,29 +228,42 @@ def _found_paths(photo: Photo, plane: Plane) -> list[_Path]:
 
 
 def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
-    """The band around a given path, at a resolution at which its wander does not matter."""
+    """The band around a given path; one of a few columns only is looked for again from nearer."""
     prior = _inside_photo(photo, plane, np.asarray(prior, dtype=np.float64))
     unit = plane.unit_per_px(plane.to_px(prior))
     length = float(arc_length(prior)[-1])
-    reach = min(0.25 * max(photo.width_px, photo.height_px) * unit, 0.5 * length)
-    step = max(unit, reach / 80)
+    reach = 0.5 * min(min(photo.width_px, photo.height_px) * unit, length)
+    found = _band_along(photo, plane, prior, reach, unit)
+    nearer = _AROUND * found.half if found else reach / _AROUND
+    if nearer < 0.5 * reach:
+        found = _band_along(photo, plane, prior, nearer, unit) or found
+    if found is None:
+        raise EvidenceError(
+            f"{photo.name}: no bead can be told from the plate along the given path; check that "
+            "the photo and its calibration belong to this weld"
+        )
+    return found
+
+
+def _band_along(
+    photo: Photo, plane: Plane, prior: Points, reach: float, unit: float
+) -> _Path | None:
+    """The band within `reach` of a path, at a resolution at which its wander does not matter."""
+    step = max(unit, reach / _COLUMNS)
     line = fit_centreline(prior, step, 6 * step)
     strip = sample_strip(photo, plane, line, reach, step, blur=step / unit)
-    features = stack_texture(strip.opponent, 1.5)
-    every = max(2, len(features) // _SECTIONS)
+    features = strip_features(strip.opponent, 1.5)
+    every = max(2, -(-len(features) // _SECTIONS))
     sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
     columns = features.shape[1]
     held = (columns / 2, _ASIDE * columns)
     band = BandSearch(sections, 3.0, 0.7 * columns, held=held).best()
     if band is None:
-        raise EvidenceError(
-            f"{photo.name}: no bead can be told from the plate along the given path; check that "
-            "the photo and its calibration belong to this weld"
-        )
+        return None
     middle = strip.offset((band.left + band.right) / 2 - 0.5)
     rows = (np.arange(band.first, band.last + 1) * every + every // 2).clip(0, len(line.s) - 1)
     points = line.points[rows] + middle[:, None] * line.normals[rows]
-    half = float(np.median(band.right - band.left)) / 2 * step
+    half = median(band.right - band.left) / 2 * step
     return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, 0.0, False))
 
 
@@ -329,9 +346,9 @@ def _calmed(extent: Extent, strip: Strip) -> Extent:
 
 def _running_median(values: Floats, strip: Strip, extent: Extent) -> Floats:
     """Calm over half a width along the strip."""
-    from scipy.ndimage import gaussian_filter1d, median_filter
+    from scipy.ndimage import median_filter
 
     row = float(strip.line.s[1] - strip.line.s[0])
-    size = int(max(5, np.median(extent.half) * strip.step / row))
+    size = int(max(5, median(extent.half) * strip.step / row))
     calm = median_filter(values, 2 * (size // 2) + 1, mode="nearest")
-    return np.asarray(gaussian_filter1d(calm, size / 4, mode="nearest"))
+    return calmed(calm, size / 4)

@@ -10,7 +10,8 @@ from seamlog.errors import EvidenceError
 from .band import edge_evidence
 from .chain import best_chains
 from .features import Features, Planes, in_spreads, planes_of, smoothed
-from .zones import likeness, zone
+from .series import median
+from .zones import Looks, looks_of, zone
 
 Floats = NDArray[np.float64]
 
@@ -49,9 +50,9 @@ class Extent:
 
 @dataclass(frozen=True, slots=True)
 class StripLook:
-    """A strip's features averaged along it, what of it is in the photo, its edges."""
+    """How a strip looks, averaged along it, what of it is in the photo, its edges."""
 
-    planes: Planes
+    looks: Looks
     valid: NDArray[np.bool_]
     edges: NDArray[np.float32]
 
@@ -59,7 +60,7 @@ class StripLook:
 def strip_look(features: Features, valid: NDArray[np.bool_], along: float) -> StripLook:
     """The look of a strip, averaged over `along` rows (Gaussian sigma)."""
     planes = planes_of(smoothed(features, 0.8, along))
-    return StripLook(planes, valid, _edges(in_spreads(planes)))
+    return StripLook(looks_of(planes), valid, _edges(in_spreads(planes)))
 
 
 def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> Extent:
@@ -68,16 +69,16 @@ def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> 
     Between a toe and `beyond` half widths outside of it nothing counts as plate beforehand.
     """
     valid, columns = look.valid, look.valid.shape[1]
-    half = float(np.median(rough.half))
-    bead = zone(
-        columns, rough.middle - _CORE * rough.half, rough.middle + _CORE * rough.half, valid
-    )
+    half = median(rough.half)
+    inside = rough.middle - _CORE * rough.half, rough.middle + _CORE * rough.half
+    bead = look.looks.shares(zone(columns, *inside, valid))
     core = zone(columns, rough.middle - 0.7 * half, rough.middle + 0.7 * half, valid)
     reach = freedom * half + 2
     windows = _windows(columns, rough, reach)
     scores, present = [], np.full(len(rough.left), np.inf)
     for side, edge, window in zip((-1, 1), (rough.left, rough.right), windows, strict=True):
-        like = likeness(look.planes, bead, _plate(columns, edge, side, half, beyond, valid))
+        plate = look.looks.shares(_plate(columns, edge, side, half, beyond, valid))
+        like = look.looks.likeness(bead, plate).reshape(valid.shape)
         like *= valid
         near = np.abs(np.arange(window.start, window.stop) - edge[:, None]) <= reach
         scores.append(_score(like[:, window], look.edges[:, window], side, half, near))

@@ -13,6 +13,7 @@ from .curve import Centreline
 from .image import Photo
 from .measurement import END, TRUSTED, BeadMeasurement
 from .plane import Plane, Points
+from .series import median
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def assemble(
     """
     left, right = toes
     width = right.offset - left.offset
-    typical = float(np.median(width))
+    typical = median(width)
     reasons = _reasons(left, right, width, typical, line)
     left_px, right_px, centre_px = _points(plane, line, left, right)
     bead = _bead_rows(left.present)
@@ -163,14 +164,14 @@ def _reasons(
 
 
 def _faint(height: Floats) -> NDArray[np.bool_]:
-    return np.asarray(height < 0.15 * np.median(height))
+    return np.asarray(height < 0.15 * median(height))
 
 
 def _strays(offset: Floats, typical: float, line: Centreline) -> NDArray[np.bool_]:
     step = float(line.s[1] - line.s[0])
     size = 2 * int(max(3, 0.5 * typical / step) // 2) + 1
     away = offset - median_filter(offset, size, mode="nearest")
-    spread = 1.4826 * float(np.median(np.abs(away)))
+    spread = 1.4826 * median(np.abs(away))
     return np.asarray(np.abs(away) > np.maximum(6 * spread, 0.06 * typical))
 
 
@@ -194,7 +195,7 @@ def _evidence(
     step: float,
     length: float,
 ) -> Evidence:
-    astray = max(float(np.median(toe.disagreement)) for toe in toes)
+    astray = max(median(toe.disagreement) for toe in toes)
     return Evidence(
         apart=min(toe.distance for toe in toes),
         band=band.evidence,
@@ -204,7 +205,7 @@ def _evidence(
         flank=band.flank,
         nested=band.nested,
         sharper=band.sharper,
-        step_grey=min(float(np.median(np.abs(toe.bare))) for toe in toes),
+        step_grey=min(median(np.abs(toe.bare)) for toe in toes),
         lengths=length / typical,
         width_px=typical / step,
         astray=astray / max(typical, step),

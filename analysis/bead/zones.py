@@ -10,6 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 from .features import Features, Planes, quantiles
 
 Floats = NDArray[np.float64]
+Places = NDArray[np.int64]
 
 _CLIP = 3.0
 _TEXTURE = 0.3
@@ -47,40 +48,51 @@ def zone(columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]) ->
     return (at >= first) & (at < end) & valid
 
 
-def likeness(
-    planes: Planes, inside: NDArray[np.bool_], outside: NDArray[np.bool_]
-) -> NDArray[np.float32]:
-    """Log-likelihood ratio inside : outside per place, by how often its look occurs in each.
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """How each place of a strip looks: the bin of its colours together and that of its texture.
 
-    Colours are counted together, in a smoothed histogram, since a bead has many: metal, slag,
-    glare. Texture is counted by itself and weighs less. Clipped, so that no place decides alone.
+    Colours are counted together, since a bead has many: metal, slag, glare.
     """
-    flat = planes.reshape(len(planes), -1)
-    zones = np.flatnonzero(inside), np.flatnonzero(outside)
-    ratio = _log_ratio(flat[:-1], *zones)
-    ratio += np.float32(_TEXTURE) * _log_ratio(flat[-1:], *zones)
-    return np.clip(ratio, -_CLIP, _CLIP, out=ratio).reshape(inside.shape)
+
+    colours: Places
+    channels: int
+    texture: Places
+
+    def shares(self, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+        """How often each look occurs in a zone: colours and texture, smoothed."""
+        at = np.flatnonzero(mask)
+        return _shares(self.colours.take(at), self.channels), _shares(self.texture.take(at), 1)
+
+    def likeness(
+        self, inside: tuple[Floats, Floats], outside: tuple[Floats, Floats]
+    ) -> NDArray[np.float32]:
+        """Log-likelihood ratio inside : outside per place (n,), by the shares in two zones.
+
+        Texture weighs less than colours. Clipped, so that no place decides alone.
+        """
+        colours, texture = (np.log(a / b) for a, b in zip(inside, outside, strict=True))
+        ratio = colours.astype(np.float32).take(self.colours)
+        ratio += (_TEXTURE * texture).astype(np.float32).take(self.texture)
+        return np.clip(ratio, -_CLIP, _CLIP, out=ratio)
 
 
-def _log_ratio(
-    planes: NDArray[np.float32], inside: NDArray[np.int64], outside: NDArray[np.int64]
-) -> NDArray[np.float32]:
-    """Of the channels `planes` (k, places) together, by the places of both zones."""
-    both = np.concatenate([inside, outside])
-    bins = (_bins(plane, *quantiles(plane.take(both), 0.01)) for plane in planes)
-    places = functools.reduce(lambda places, more: places * _BINS + more, bins)
-    a, b = (_shares(places.take(zone_), len(planes)) for zone_ in (inside, outside))
-    return np.log(a / b).astype(np.float32).take(places)
+def looks_of(planes: Planes) -> Looks:
+    """The looks of a strip's places, row by row."""
+    *colours, texture = (_bins(plane.ravel()) for plane in planes)
+    together = functools.reduce(lambda places, more: places * _BINS + more, colours)
+    return Looks(together, len(colours), texture)
 
 
-def _bins(plane: NDArray[np.float32], low: float, high: float) -> NDArray[np.int64]:
+def _bins(plane: NDArray[np.float32]) -> Places:
+    low, high = quantiles(plane, 0.01)
     bins = plane - np.float32(low)
     bins /= np.float32(max((high - low) / _SPAN, 1e-3))
     bins += np.float32((_BINS - _SPAN) // 2)
     return np.clip(bins, 0, _BINS - 1, out=bins).astype(np.int64)
 
 
-def _shares(places: NDArray[np.int64], channels: int) -> Floats:
+def _shares(places: Places, channels: int) -> Floats:
     """How often each bin of a smoothed histogram occurs, flat."""
     counted = np.bincount(places, minlength=_BINS**channels).astype(np.float64)
     for _ in range(channels):

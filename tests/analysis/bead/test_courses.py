@@ -39,12 +39,16 @@ def steep(t: Floats) -> tuple[Floats, Floats]:
     return 150 + 370 * t, -20 + 480 * t
 
 
-def drawn(course: Course) -> NDArray[np.uint8]:
+def along(t: Floats) -> tuple[Floats, Floats]:
+    return -40 + 740 * t, 220 + 8 * np.sin(5 * t)
+
+
+def drawn(course: Course, half_px: int = HALF_PX) -> NDArray[np.uint8]:
     """A bright bead of constant width on a plate with some texture."""
     rng = np.random.default_rng(0)
     mask = np.zeros((ROWS * FINER, COLUMNS * FINER), np.uint8)
     for x, y in zip(*course(np.linspace(0, 1, 400)), strict=True):
-        cv2.circle(mask, (round(x * FINER), round(y * FINER)), HALF_PX * FINER, 255, -1)
+        cv2.circle(mask, (round(x * FINER), round(y * FINER)), half_px * FINER, 255, -1)
     covered = cv2.resize(mask, (COLUMNS, ROWS), interpolation=cv2.INTER_AREA) / 255
     texture = 12 * cv2.GaussianBlur(rng.standard_normal((ROWS, COLUMNS)), (0, 0), 1.5)
     picture = 95 + 0.6 * texture + covered * (75 + 1.5 * texture)
@@ -72,3 +76,17 @@ def test_a_bead_that_ends_in_the_photo_ends_there() -> None:
     assert result.centre_px[0, 0] == pytest.approx(110 - HALF_PX, abs=5)
     assert result.centre_px[-1, 0] == pytest.approx(550 + HALF_PX, abs=5)
     assert {result.reason[0], result.reason[-1]} == {"end of the bead"}
+
+
+@pytest.mark.parametrize("half_px", [6, 8, HALF_PX, 60, 90, 105])
+def test_width_along_a_given_path_from_near_and_from_far(half_px: int) -> None:
+    """The path wanders by a fifth of the half width; from near, plate is seen on a few px only."""
+    photo = make_photo(drawn(along, half_px), "given.png")
+    t = np.linspace(0.06, 0.94, 60)
+    x, y = along(t)
+    path = np.column_stack([x, y + 0.2 * half_px * np.sin(20 * t)])
+    result = measure_strip(photo, plane_of(photo, None), path)
+    error = result.width[result.good] - 2 * half_px
+    assert np.abs(np.median(error)) <= 0.3
+    assert result.flagged.mean() <= 0.15
+    assert result.trusted == (half_px >= 15)

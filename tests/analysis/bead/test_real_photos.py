@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from seamlog.analysis.bead.assess import AssessedPhoto, assess_photos
+from seamlog.analysis.bead.image import load_photo
 from seamlog.analysis.bead.measurement import TRUSTED
+from seamlog.analysis.bead.plane import plane_of
 from seamlog.analysis.bead.sources import photo_files
+from seamlog.analysis.bead.strip import measure_strip
 
 MEDIAN_ERROR = 0.05
 WITHIN_5_PERCENT = 9
@@ -56,6 +59,22 @@ def test_mean_width_of_real_beads(human_widths: dict[Path, float]) -> None:
 def test_no_trusted_width_is_far_off(human_widths: dict[Path, float]) -> None:
     for path, (error, confidence) in relative_errors(human_widths).items():
         assert abs(error) <= WORST_TRUSTED or confidence < TRUSTED, path.stem
+
+
+def test_a_given_path_leads_to_the_same_bead(human_widths: dict[Path, float]) -> None:
+    """Beads that fill a fifth to two fifths of the photo, and paths that wander in them."""
+    errors = []
+    for path, human_px in human_widths.items():
+        photo = load_photo(path)
+        plane = plane_of(photo, None)
+        found = measure_strip(photo, plane)
+        middle = found.centre_px[:: len(found.centre_px) // 40]
+        wander = 0.12 * human_px * np.sin(np.linspace(0, 9, len(middle)))
+        given = measure_strip(photo, plane, middle + wander[:, None] * (0.3, 1.0))
+        error = given.width[given.good].mean() / human_px - 1
+        assert abs(error) <= WORST_TRUSTED or not given.trusted, path.stem
+        errors.append(abs(error))
+    assert np.median(errors) <= MEDIAN_ERROR
 
 
 def test_messy_photos_never_give_millimetres(data_dir: Path) -> None:
