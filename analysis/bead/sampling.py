@@ -79,8 +79,6 @@ def sample_rows(
         part = _deep(part)
     else:
         x, y = ((at + np.float32(0.5)) / np.float32(factor) - np.float32(0.5) for at in (x, y))
-    if blur / factor > 1.3:
-        part = cv2.GaussianBlur(part, (0, 0), 0.4 * blur / factor)
     sampled = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return opponent(sampled), valid
 

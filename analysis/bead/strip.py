@@ -44,6 +44,9 @@ _PAST, _LOST = 2.0, 0.5
 and that each tracing adds at the ends: a stiff curve loses as much when it is moved to the toes."""
 _COLUMNS, _SECTIONS = 60, 48
 """Columns to each side of a given path, and sections, in which the band is looked for."""
+_LONG = 0.25
+"""Reach to each side, in lengths of a path that lies in the photo as a whole: beads are longer than
+wide, and what is broader is the plate on its table."""
 _AROUND = 8.0
 """Half widths to each side of a given path that show a band well."""
 
@@ -232,7 +235,8 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     prior = _inside_photo(photo, plane, np.asarray(prior, dtype=np.float64))
     unit = plane.unit_per_px(plane.to_px(prior))
     length = float(arc_length(prior)[-1])
-    reach = 0.5 * min(min(photo.width_px, photo.height_px) * unit, length)
+    longest = _LONG if _ends_inside(photo, plane, prior, 0.1 * length) else 0.5
+    reach = min(0.5 * min(photo.width_px, photo.height_px) * unit, longest * length)
     found = _band_along(photo, plane, prior, reach, unit)
     nearer = _AROUND * found.half if found else reach / _AROUND
     if nearer < 0.5 * reach:
@@ -265,6 +269,13 @@ def _band_along(
     points = line.points[rows] + middle[:, None] * line.normals[rows]
     half = median(band.right - band.left) / 2 * step
     return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, 0.0, False))
+
+
+def _ends_inside(photo: Photo, plane: Plane, path: Points, margin: float) -> bool:
+    """Whether both ends are `margin` away from the photo's frame."""
+    ends = plane.to_px(path[[0, -1]])
+    away = margin / plane.unit_per_px(ends)
+    return bool(_in_photo(photo, ends - away).all() and _in_photo(photo, ends + away).all())
 
 
 def _inside_photo(photo: Photo, plane: Plane, prior: Points) -> Points:

@@ -90,3 +90,14 @@ def test_width_along_a_given_path_from_near_and_from_far(half_px: int) -> None:
     assert np.abs(np.median(error)) <= 0.3
     assert result.flagged.mean() <= 0.15
     assert result.trusted == (half_px >= 15)
+
+
+def test_the_plate_on_its_table_is_no_bead() -> None:
+    rng = np.random.default_rng(3)
+    table = np.clip(60 + 25 * rng.standard_normal((900, 1300)), 0, 255).astype(np.uint8)
+    table[230:670, 320:980] = drawn(closed)
+    x, y = closed(np.linspace(0, 1, 50))
+    photo = make_photo(table, "plate.png")
+    result = measure_strip(photo, plane_of(photo, None), np.column_stack([x + 320, y + 230]))
+    assert np.median(result.width[result.good]) == pytest.approx(2 * HALF_PX, abs=0.3)
+    assert result.trusted
