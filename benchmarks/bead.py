@@ -125,7 +125,7 @@ def speed(quick: bool) -> Iterator[Figure]:
     photo = make_photo(bead.pixels, "big")
     plane, path = plane_of(photo, bead.calibration), bead.wandering_path(seed=1)
     megapixels = photo.width_px * photo.height_px / 1e6
-    own = cpu_s(lambda: measure_strip(photo, plane, path), 15) / megapixels
+    own = cpu_s(lambda: measure_strip(make_photo(bead.pixels, "big"), plane, path), 15) / megapixels
     yield Figure(f"{megapixels:.1f} MP with a path prior", 1e3 * own, "ms/MP", "<= 4")
     with optional_peer("scikit-image"):
         peer = cpu_s(lambda: skeleton(photo), 1) / megapixels

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .features import Features, Planes, in_spreads, planes_of
+from .series import median
 
 Floats = NDArray[np.float32]
 
@@ -46,8 +47,13 @@ class Band:
     total: float
 
 
+def relative(other: Band | None, band: Band) -> float:
+    """How evident another band is, 0 to 1, if it is less so than `band`."""
+    return other.total / band.total if other else 0.0
+
+
 class _Sums:
-    """Running sums along each section, so that any window's mean is a difference of two slices.
+    """Running sums along each section, so that any window's sum is a difference of two slices.
 
     Of the features and of their squares, (2, features, rows, columns), padded so that windows may
     reach over the borders.
@@ -62,13 +68,25 @@ class _Sums:
         self._sums[..., 2 * self.columns + 1 :] = total[..., -1:]
         self._known = np.clip(np.arange(size) - self.columns, 0, self.columns).astype(np.float32)
 
-    def window(self, centres: range, half: int) -> Floats:
-        """Means over columns [c - half, c + half) for each c, (2, features, rows, c)."""
+    def over(self, centres: range, start: int, stop: int) -> tuple[Floats, Floats]:
+        """Sums over the columns [c + start, c + stop) that there are, and how many, for each c.
+
+        Shapes (2, features, rows, c) and (c,).
+        """
+        before, up_to = self._slices(centres, start, stop)
+        sums = self._sums[..., up_to] - self._sums[..., before]
+        return sums, self._known[up_to] - self._known[before]
+
+    def roughness(self, centres: range, start: int, stop: int) -> Floats:
+        """Means of the last feature over columns [c + start, c + stop), (rows, c)."""
+        before, up_to = self._slices(centres, start, stop)
+        sums = self._sums[0, -1, :, up_to] - self._sums[0, -1, :, before]
+        sums /= np.maximum(self._known[up_to] - self._known[before], 1)
+        return np.asarray(sums)
+
+    def _slices(self, centres: range, start: int, stop: int) -> tuple[slice, slice]:
         first, last = centres.start + self.columns, centres.stop + self.columns
-        before, up_to = slice(first - half, last - half), slice(first + half, last + half)
-        total = self._sums[..., up_to] - self._sums[..., before]
-        total /= np.maximum(self._known[up_to] - self._known[before], 1)
-        return np.asarray(total)
+        return slice(first + start, last + start), slice(first + stop, last + stop)
 
 
 def _saturate(square: Floats, half_at: float) -> Floats:
@@ -107,14 +125,17 @@ def _contrast(sums: _Sums, centres: range, half: int) -> Floats:
     from looking like a band: its sides differ from each other more than from it. A band with more
     texture than its sides counts up to a quarter more.
     """
-    away = 2 * half
-    means = sums.window(range(centres.start - away, centres.stop + away), half)
-    one, band, two = (means[..., at : at + len(centres)] for at in (0, away, 2 * away))
-    (inside, square), (around, square_around) = band, (one + two) / 2
-    spread = (square + square_around - inside * inside - around * around) / 2
-    change = (inside - around) ** 2 / (np.maximum(spread, 0) + np.float32(_FLOOR))
-    rougher = np.maximum(inside[-1] - np.maximum(one[0, -1], two[0, -1]), 0)
-    return np.asarray(_saturate(change.sum(axis=0), 2.0) * (1 + 0.25 * np.tanh(rougher)))
+    band, own = sums.over(centres, -half, half)
+    sides, known = sums.over(centres, -3 * half, 3 * half)
+    sides -= band
+    sides /= np.maximum(known - own, 1)
+    band /= own
+    (inside, square), (around, square_around) = band, sides
+    twice_spread = square + square_around - inside * inside - around * around
+    change = (inside - around) ** 2 / (np.maximum(twice_spread, 0) + np.float32(2 * _FLOOR))
+    beside = (sums.roughness(centres, *side) for side in ((-3 * half, -half), (half, 3 * half)))
+    rougher = np.maximum(inside[-1] - np.maximum(*beside), 0)
+    return np.asarray(_saturate(change.sum(axis=0), 1.0) * (1 + 0.25 * np.tanh(rougher)))
 
 
 class BandSearch:
@@ -155,6 +176,24 @@ class BandSearch:
             score = score * np.atleast_2d(allowed)[:, None]
         band = _trace(score, self._halves[keep], self._slope)
         return band if band is not None and band.last - band.first >= _SHORTEST else None
+
+    def beside(self, band: Band) -> Band | None:
+        """The best band with its middle outside `band` and its margin."""
+        allowed = np.ones((self.rows, self.columns + 1), dtype=np.float32)
+        allowed[band.first : band.last + 1][self._away(band) < 1.6] = 0
+        return self.best(allowed)
+
+    def inside(self, band: Band) -> Band | None:
+        """The best band of at most two thirds of the width near the middle of `band`."""
+        allowed = np.zeros((self.rows, self.columns + 1), dtype=np.float32)
+        allowed[band.first : band.last + 1][self._away(band) < 0.4] = 1
+        return self.best(allowed, max(4.0, 0.65 * median(band.right - band.left)))
+
+    def _away(self, band: Band) -> NDArray[np.float64]:
+        """Distance of each column edge from the band's middle, in half widths, by row of it."""
+        columns = np.arange(self.columns + 1)
+        distance = np.abs(columns - (band.right + band.left)[:, None] / 2)
+        return np.asarray(distance / ((band.right - band.left)[:, None] / 2))
 
     def _score(self, planes: Planes, weight: Floats) -> Floats:
         """Evidence per section, half width and centre, shape (rows, halves, centres).

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_INNER = 0.6
+"""Evidence of a band inside, relative to the whole, from which on it may be the bead."""
+
 
 def soft_px(width_px: float) -> float:
     """Blur of a toe from which on it may be the fading end of something rather than a toe."""
@@ -15,6 +18,14 @@ def soft_px(width_px: float) -> float:
 def _sharp_px(width_px: float) -> float:
     """Blur of a toe up to which it is one, whatever band lies inside."""
     return float(np.clip(0.006 * width_px, 1.5, 3.5))
+
+
+def may_be_tint(inner: float, blur_px: float, width_px: float) -> bool:
+    """Whether what was found may be a heat tint, so that the surface beside its toes counts.
+
+    For the arguments see `Evidence`.
+    """
+    return inner > _INNER or blur_px > soft_px(width_px)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,13 +69,20 @@ class Doubt:
 def doubts(evidence: Evidence) -> list[Doubt]:
     """All doubts, the worst first."""
     e = evidence
-    inside = max(np.clip((e.inner - 0.6) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
+    inside = max(np.clip((e.inner - _INNER) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
     soft = np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
     less_sharp = np.clip(e.blur_px - _sharp_px(e.width_px), 0, 1)
-    film = np.clip((e.inner - 0.6) / 0.15, 0, 1) * np.clip((1.6 - e.flank) / 0.3, 0, 1)
+    film = np.clip((e.inner - _INNER) / 0.15, 0, 1) * np.clip((1.6 - e.flank) / 0.3, 0, 1)
+    soft_at_all = np.clip((e.blur_px - soft_px(e.width_px)) / 0.5, 0, 1)
+    alike = np.clip((1.8 - e.flank) / 0.3, 0, 1)
+    faded = (
+        soft_at_all
+        * alike
+        * max(np.clip((e.inner - 0.5) / 0.15, 0, 1), np.clip((e.sharper - 1) / 0.3, 0, 1))
+    )
     # Soft toes of a surface rougher than the plate are out of focus or ragged, no fading tint.
     smooth = 1.0 if np.isinf(e.flank) else np.clip((2.6 - e.flank) / 0.8, 0, 1)
-    tinted = max(smooth * max(0.5 * soft, inside * less_sharp), film)
+    tinted = max(smooth * max(0.5 * soft, inside * less_sharp), film, faded)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),
@@ -75,7 +93,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
         (e.step_grey / 8, f"a toe's step is {e.step_grey:.1f} grey levels only"),
         (e.lengths / 10, f"it is {e.lengths:.1f} times as long as wide: a bead is longer"),
         (
-            max(0.45, 1 - e.nested * (0.5 + 0.5 * less_sharp)),
+            max(0.45, 1 - max(e.nested, less_sharp * (e.nested > 0)) * (0.5 + 0.5 * less_sharp)),
             "it lies inside a broader band that is as evident: a heat tint?",
         ),
         (

@@ -5,6 +5,8 @@ truth: the fading end of a heat tint rather than the toes of a bead. And a tint 
 leaves the plate's surface as it was, where weld metal is mostly rougher.
 """
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from .band import BandSearch
 from .curve import Centreline, fit_centreline
 from .features import smoothed, strip_features
-from .image import Photo
+from .image import Photo, opponent
 from .plane import Plane, Points
 from .refine import averaged_at, columns_of_change
 from .sampling import sample_rows, sample_strip
@@ -93,16 +95,32 @@ def flank_texture(
     Of both toes the greater; 0 for a toe beyond which no plate is in the photo.
     """
     width = median(toes[1].offset - toes[0].offset)
-    grey = np.ascontiguousarray(photo.opponent()[..., 0])
     reach_px = max(1.5, _REACH * width / unit)
+    sides = [
+        plane.to_px(
+            np.concatenate([line.shifted(toe.offset + out * away) for away in _FLANK * width / 2])
+        )
+        for toe, inward in zip(toes, (1, -1), strict=True)
+        for out in (inward, -inward)
+    ]
+    inside_left, beyond_left, inside_right, beyond_right = _detail(photo, sides, reach_px)
+    return max(inside_left / beyond_left, inside_right / beyond_right)
+
+
+def _detail(photo: Photo, groups: Sequence[Points], reach_px: float) -> list[float]:
+    """Typical detail finer than `reach_px` at each group of places; inf off the photo."""
+    size = np.array([photo.width_px, photo.height_px])
+    places = [np.rint(group).astype(np.int64) for group in groups]
+    seen = [group[((group >= 0) & (group < size)).all(axis=1)] for group in places]
+    every = np.concatenate(seen)
+    if not len(every):
+        return [np.inf] * len(seen)
+    margin = int(4 * reach_px) + 1
+    left, top = np.maximum(every.min(axis=0) - margin, 0)
+    right, bottom = every.max(axis=0) + margin
+    grey = np.ascontiguousarray(opponent(photo.pixels[top:bottom, left:right])[..., 0])
     detail = np.abs(grey - cv2.GaussianBlur(grey, (0, 0), reach_px))
-
-    def typical(toe: Toes, outward: int) -> float:
-        places = [line.shifted(toe.offset + outward * away) for away in _FLANK * width / 2]
-        x, y = np.rint(plane.to_px(np.concatenate(places))).astype(np.int64).T
-        seen = (x >= 0) & (y >= 0) & (x < photo.width_px) & (y < photo.height_px)
-        return median(detail[y[seen], x[seen]]) + _ROUNDING if seen.any() else np.inf
-
-    return max(
-        typical(toe, -side) / typical(toe, side) for side, toe in zip((-1, 1), toes, strict=True)
-    )
+    return [
+        median(detail[group[:, 1] - top, group[:, 0] - left]) + _ROUNDING if len(group) else np.inf
+        for group in seen
+    ]

@@ -12,6 +12,8 @@ Floats = NDArray[np.float64]
 
 _DEGREE = 5
 """A stiff curve follows a seam's bends and not the unevenness of its toes."""
+_FINE = 100
+"""Chords per knot spacing that are as long as the curve."""
 _ENOUGH = 60
 """Points from which on a curve is that stiff; fewer do not tie it down."""
 
@@ -52,14 +54,14 @@ def fit_centreline(path: Points, step: float, knot_spacing: float) -> Centreline
     keep = np.concatenate([[True], np.diff(length) > 1e-9])
     path, length = path[keep], length[keep]
     curve = _spline(path, length, knot_spacing)
-    dense = np.linspace(0.0, length[-1], max(64, int(length[-1] / step)))
+    pace = max(step, knot_spacing / _FINE)
+    dense = np.linspace(0.0, length[-1], max(64, int(length[-1] / pace)))
     walked = arc_length(curve(dense))
     s = np.arange(0.0, walked[-1] + 1e-9, step)
-    at = np.interp(s, walked, dense)
-    tangent = np.asarray(curve(at, nu=1))
-    tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
-    normals = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-    return Centreline(s, np.asarray(curve(at)), normals)
+    points = np.asarray(curve(np.interp(s, walked, dense)))
+    along_x, along_y = np.gradient(points, axis=0).T
+    normals = np.column_stack([-along_y, along_x]) / np.hypot(along_x, along_y)[:, None]
+    return Centreline(s, points, normals)
 
 
 def _spline(path: Points, length: Floats, knot_spacing: float) -> BSpline:

@@ -1,6 +1,6 @@
 """Photos: decoded within limits, upright, as opponent channels: lightness and two colours."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ class Photo:
 
     pixels: NDArray[Any]
     name: str
+    _halves: list[NDArray[Any]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def height_px(self) -> int:
@@ -37,6 +38,20 @@ class Photo:
     def width_px(self) -> int:
         """Columns."""
         return int(self.pixels.shape[1])
+
+    def reduced(self, factor: int) -> NDArray[Any]:
+        """Pixels at 1 / factor of the size, a power of two: means of whole blocks.
+
+        What is over at the far borders goes.
+        """
+        levels = [self.pixels, *self._halves]
+        for level in range(len(levels), factor.bit_length()):
+            finer = levels[level - 1]
+            rows, columns = (size // 2 for size in finer.shape[:2])
+            whole = finer[: 2 * rows, : 2 * columns]
+            levels.append(cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA))
+        self._halves[:] = levels[1:]
+        return levels[factor.bit_length() - 1]
 
     def opponent(self) -> NDArray[Any]:
         """float32 (rows, columns, 3): lightness 0-255, red - green, yellow - blue.

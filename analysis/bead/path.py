@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError
 
-from .band import Band, BandSearch
+from .band import Band, BandSearch, relative
 from .features import Features, reduced_features, smoothed
 from .image import Photo
 from .plane import Points
 
 _LONGEST_PX = 288
-_NESTED = 0.7
+NESTED = 0.7
 """Relative evidence from which on a band inside the found one may be the bead itself."""
 _ALIKE = 0.9
 """Relative evidence from which on a band beside the found one may be the bead instead."""
@@ -58,15 +58,15 @@ def find_paths(photo: Photo) -> list[CoarsePath]:
             "plate; take the photo from above with even light, or give the path by --session"
         )
     search = searches[vertical]
-    inside = _inside(search, band)
-    beside = _beside(search, band)
-    rival, inner = _relative(beside, band), _relative(inside, band)
+    inside = search.inside(band)
+    beside = search.beside(band)
+    rival, inner = relative(beside, band), relative(inside, band)
     found = [_in_photo(band, vertical, factor, rival, inner)]
-    if inside is not None and inner >= _NESTED:
-        deeper = _relative(_inside(search, inside), inside)
+    if inside is not None and inner >= NESTED:
+        deeper = relative(search.inside(inside), inside)
         found.append(_in_photo(inside, vertical, factor, rival, deeper, nested=True))
     if beside is not None and rival >= _ALIKE:
-        deeper = _relative(_inside(search, beside), beside)
+        deeper = relative(search.inside(beside), beside)
         found.append(_in_photo(beside, vertical, factor, rival, deeper))
     return found
 
@@ -76,31 +76,6 @@ def _search(features: Features, vertical: bool) -> BandSearch:
     turned = features if vertical else np.swapaxes(features, 0, 1)
     sections = smoothed(np.ascontiguousarray(turned), 0, 2.0)[_ALONG // 2 :: _ALONG]
     return BandSearch(sections, 3.0, 0.6 * sections.shape[1], slope=_ALONG)
-
-
-def _relative(other: Band | None, band: Band) -> float:
-    return other.total / band.total if other else 0.0
-
-
-def _away(search: BandSearch, band: Band) -> NDArray[np.float64]:
-    """Distance of each column edge from the band's middle, in half widths, by row of the band."""
-    columns = np.arange(search.columns + 1)
-    distance = np.abs(columns - (band.right + band.left)[:, None] / 2)
-    return np.asarray(distance / ((band.right - band.left)[:, None] / 2))
-
-
-def _beside(search: BandSearch, band: Band) -> Band | None:
-    """The best band with its middle outside `band` and its margin."""
-    allowed = np.ones((search.rows, search.columns + 1), dtype=np.float32)
-    allowed[band.first : band.last + 1][_away(search, band) < 1.6] = 0
-    return search.best(allowed)
-
-
-def _inside(search: BandSearch, band: Band) -> Band | None:
-    """The best band of at most two thirds of the width near the middle of `band`."""
-    allowed = np.zeros((search.rows, search.columns + 1), dtype=np.float32)
-    allowed[band.first : band.last + 1][_away(search, band) < 0.4] = 1
-    return search.best(allowed, max(4.0, 0.65 * float(np.median(band.right - band.left))))
 
 
 def _in_photo(

@@ -13,6 +13,9 @@ from .plane import Plane
 
 Floats = NDArray[np.float32]
 
+_SMALLEST = 4
+"""Pixels of a side that are enough to sample between."""
+
 
 @dataclass(frozen=True, slots=True)
 class Strip:
@@ -67,20 +70,30 @@ def sample_rows(
     (rows, count, channels) and (rows, count); for `blur` see `sample_strip`.
     """
     x, y = _maps(plane, line, first, step, count)
-    left, right = _span(x, photo.width_px)
-    top, bottom = _span(y, photo.height_px)
-    valid = _inside(x, photo.width_px) & _inside(y, photo.height_px)
-    part = photo.pixels[top:bottom, left:right]
-    x, y = x - np.float32(left), y - np.float32(top)
     factor = 1
-    while 2 * factor <= blur and min(part.shape[:2]) >= 2:
-        part, factor = _halved(part), 2 * factor
-    if factor == 1:
-        part = _deep(part)
-    else:
-        x, y = ((at + np.float32(0.5)) / np.float32(factor) - np.float32(0.5) for at in (x, y))
+    while 2 * factor <= min(blur, photo.width_px / _SMALLEST, photo.height_px / _SMALLEST):
+        factor *= 2
+    pixels = photo.reduced(factor)
+    x, inside, columns = _placed(x, photo.width_px, factor)
+    y, between, rows = _placed(y, photo.height_px, factor)
+    part = pixels[rows, columns] if factor > 1 else _deep(pixels[rows, columns])
     sampled = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return opponent(sampled), valid
+    return opponent(sampled), inside & between
+
+
+def _placed(at: Floats, size: int, factor: int) -> tuple[Floats, NDArray[np.bool_], slice]:
+    """Coordinates along one side of the photo within a part of the reduced one, and that part.
+
+    Between them, which coordinates lie in the photo.
+    """
+    low, high = float(at.min()), float(at.max())
+    inside = np.ones(at.shape, dtype=bool)
+    if low < 0 or high > size - 1:
+        inside = (at >= 0) & (at <= size - 1)
+    first = min(max(int(low / factor) - 3, 0), size // factor - _SMALLEST)
+    last = max(int(high / factor) + 5, first + _SMALLEST)
+    at = (at + np.float32(0.5)) / np.float32(factor) - np.float32(first + 0.5)
+    return at, inside, slice(first, last)
 
 
 def _deep(pixels: NDArray[Any]) -> NDArray[Any]:
@@ -88,24 +101,6 @@ def _deep(pixels: NDArray[Any]) -> NDArray[Any]:
     if pixels.dtype == np.uint16:
         return pixels
     return np.asarray(np.multiply(pixels, np.uint16(257), dtype=np.uint16))
-
-
-def _inside(at: Floats, size: int) -> NDArray[np.bool_]:
-    if at.min() >= 0 and at.max() <= size - 1:
-        return np.ones(at.shape, dtype=bool)
-    return np.asarray((at >= 0) & (at <= size - 1))
-
-
-def _halved(pixels: NDArray[Any]) -> NDArray[Any]:
-    """Means of whole blocks of 2 x 2 pixels; what is over at the far borders goes."""
-    rows, columns = (size // 2 for size in pixels.shape[:2])
-    whole = pixels[: 2 * rows, : 2 * columns]
-    return cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA)
-
-
-def _span(values: Floats, size: int) -> tuple[int, int]:
-    low = int(np.clip(np.floor(values.min()) - 3, 0, size - 4))
-    return low, int(np.clip(np.ceil(values.max()) + 4, low + 4, size))
 
 
 def _maps(

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError, ImageError
 
-from .band import BandSearch
-from .confidence import soft_px
+from .band import Band, BandSearch, relative
+from .confidence import may_be_tint, soft_px
 from .core import band_inside, flank_texture, softness
 from .curve import Centreline, arc_length, fit_centreline
 from .features import smoothed, strip_features
 from .image import Photo
 from .measurement import TOES, BeadMeasurement
-from .path import find_paths
+from .path import NESTED, find_paths
 from .plane import Plane, Points
 from .refine import Rough, longest_px, refine_toes
 from .sampling import Strip, sample_strip
@@ -99,7 +99,7 @@ def measure_strip(
     beyond = _BEYOND[toe]
     if prior is not None:
         sparse = _Tracing(40, 6, (0.45,), beyond)
-        measured = _measure(photo, plane, _given_path(photo, plane, prior), start, sparse)
+        measured = _most_trusted(photo, plane, _given_paths(photo, plane, prior), start, sparse)
     else:
         dense = _Tracing(40, 1, (0.45, 0.35, 0.25), beyond)
         measured = _most_trusted(photo, plane, _found_paths(photo, plane), start, dense)
@@ -135,10 +135,12 @@ def _measure(
 ) -> BeadMeasurement:
     unit = plane.unit_per_px(plane.to_px(found.points))
     traced = _traced(photo, plane, found.points, found.half, unit, tracing)
-    band = replace(found.band, sharper=_sharper_inside(photo, plane, traced, unit, tracing))
-    if band.inner or band.sharper:
+    band = found.band
+    blur_px = min(toe.blur_px for toe in traced.toes)
+    if may_be_tint(band.inner, blur_px, 2 * traced.half / unit):
         flank = flank_texture(photo, plane, traced.line, traced.toes, unit)
-        band = replace(band, flank=flank)
+        sharper = _sharper_inside(photo, plane, traced, unit, tracing)
+        band = replace(band, flank=flank, sharper=sharper)
     return assemble(photo, plane, traced.line, traced.toes, unit, band, start)
 
 
@@ -230,18 +232,18 @@ def _found_paths(photo: Photo, plane: Plane) -> list[_Path]:
     return paths
 
 
-def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
-    """The band around a given path; one of a few columns only is looked for again from nearer."""
+def _given_paths(photo: Photo, plane: Plane, prior: Points) -> list[_Path]:
+    """Bands around a given path; one of a few columns only is looked for again from nearer."""
     prior = _inside_photo(photo, plane, np.asarray(prior, dtype=np.float64))
     unit = plane.unit_per_px(plane.to_px(prior))
     length = float(arc_length(prior)[-1])
     longest = _LONG if _ends_inside(photo, plane, prior, 0.1 * length) else 0.5
     reach = min(0.5 * min(photo.width_px, photo.height_px) * unit, longest * length)
-    found = _band_along(photo, plane, prior, reach, unit)
-    nearer = _AROUND * found.half if found else reach / _AROUND
+    found = _bands_along(photo, plane, prior, reach, unit)
+    nearer = _AROUND * found[0].half if found else reach / _AROUND
     if nearer < 0.5 * reach:
-        found = _band_along(photo, plane, prior, nearer, unit) or found
-    if found is None:
+        found = _bands_along(photo, plane, prior, nearer, unit) or found
+    if not found:
         raise EvidenceError(
             f"{photo.name}: no bead can be told from the plate along the given path; check that "
             "the photo and its calibration belong to this weld"
@@ -249,10 +251,13 @@ def _given_path(photo: Photo, plane: Plane, prior: Points) -> _Path:
     return found
 
 
-def _band_along(
+def _bands_along(
     photo: Photo, plane: Plane, prior: Points, reach: float, unit: float
-) -> _Path | None:
-    """The band within `reach` of a path, at a resolution at which its wander does not matter."""
+) -> list[_Path]:
+    """The band within `reach` of a path, and one in it that may be the bead instead.
+
+    At a resolution at which the path's wander does not matter.
+    """
     step = max(unit, reach / _COLUMNS)
     line = fit_centreline(prior, step, 6 * step)
     strip = sample_strip(photo, plane, line, reach, step, blur=step / unit)
@@ -261,14 +266,25 @@ def _band_along(
     sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
     columns = features.shape[1]
     held = (columns / 2, _ASIDE * columns)
-    band = BandSearch(sections, 3.0, 0.7 * columns, held=held).best()
+    search = BandSearch(sections, 3.0, 0.7 * columns, held=held)
+
+    def along(band: Band, inner: float, nested: float) -> _Path:
+        rows = np.arange(band.first, band.last + 1) * every + every // 2
+        rows = rows.clip(0, len(line.s) - 1)
+        middle = strip.offset((band.left + band.right) / 2 - 0.5)
+        points = line.points[rows] + middle[:, None] * line.normals[rows]
+        half = median(band.right - band.left) / 2 * step
+        return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, inner, nested))
+
+    band = search.best()
     if band is None:
-        return None
-    middle = strip.offset((band.left + band.right) / 2 - 0.5)
-    rows = (np.arange(band.first, band.last + 1) * every + every // 2).clip(0, len(line.s) - 1)
-    points = line.points[rows] + middle[:, None] * line.normals[rows]
-    half = median(band.right - band.left) / 2 * step
-    return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, 0.0, False))
+        return []
+    inside = search.inside(band)
+    inner = relative(inside, band)
+    paths = [along(band, inner, 0.0)]
+    if inside is not None and inner >= NESTED:
+        paths.append(along(inside, relative(search.inside(inside), inside), 1.0))
+    return paths
 
 
 def _ends_inside(photo: Photo, plane: Plane, path: Points, margin: float) -> bool:

@@ -10,7 +10,7 @@ import pytest
 
 from seamlog.analysis.bead.assess import AssessedPhoto, assess_photos
 from seamlog.analysis.bead.image import load_photo
-from seamlog.analysis.bead.measurement import TRUSTED
+from seamlog.analysis.bead.measurement import TRUSTED, BeadMeasurement
 from seamlog.analysis.bead.plane import plane_of
 from seamlog.analysis.bead.sources import photo_files
 from seamlog.analysis.bead.strip import measure_strip
@@ -61,20 +61,30 @@ def test_no_trusted_width_is_far_off(human_widths: dict[Path, float]) -> None:
         assert abs(error) <= WORST_TRUSTED or confidence < TRUSTED, path.stem
 
 
+def measured_along_its_middle(path: Path) -> BeadMeasurement:
+    """The bead measured along the middle of what is found without a path, which wanders."""
+    photo = load_photo(path)
+    plane = plane_of(photo, None)
+    found = measure_strip(photo, plane)
+    middle = found.centre_px[:: len(found.centre_px) // 40]
+    wander = 0.12 * found.width[found.good].mean() * np.sin(np.linspace(0, 9, len(middle)))
+    return measure_strip(photo, plane, middle + wander[:, None] * (0.3, 1.0))
+
+
 def test_a_given_path_leads_to_the_same_bead(human_widths: dict[Path, float]) -> None:
     """Beads that fill a fifth to two fifths of the photo, and paths that wander in them."""
     errors = []
     for path, human_px in human_widths.items():
-        photo = load_photo(path)
-        plane = plane_of(photo, None)
-        found = measure_strip(photo, plane)
-        middle = found.centre_px[:: len(found.centre_px) // 40]
-        wander = 0.12 * human_px * np.sin(np.linspace(0, 9, len(middle)))
-        given = measure_strip(photo, plane, middle + wander[:, None] * (0.3, 1.0))
+        given = measured_along_its_middle(path)
         error = given.width[given.good].mean() / human_px - 1
         assert abs(error) <= WORST_TRUSTED or not given.trusted, path.stem
         errors.append(abs(error))
     assert np.median(errors) <= MEDIAN_ERROR
+
+
+@pytest.mark.parametrize("name", TINTED)
+def test_a_heat_tint_along_a_given_path_is_not_trusted(data_dir: Path, name: str) -> None:
+    assert not measured_along_its_middle(data_dir / "bead_photos" / f"{name}.jpg").trusted
 
 
 def test_messy_photos_never_give_millimetres(data_dir: Path) -> None:
