@@ -1,8 +1,8 @@
-"""The loop of `closed_loop` as machine code (numba, extra `fast`), where the law is a function.
+"""Loops as machine code (numba, extra `fast`): that of `closed_loop`, where the law is a function.
 
-What is compiled is the very source that runs without numba, and only `+ - * /`, square roots and
-comparisons are in it, so the bits are the same. The machine code is kept in numba's cache in a file
-named after the code of every function in it: a changed law is compiled anew.
+What is compiled of it is the very source that runs without numba, and only `+ - * /`, square roots
+and comparisons are in it, so the bits are the same. The machine code is kept in numba's cache in a
+file named after the code of every function in it: a changed law is compiled anew.
 """
 
 import hashlib
@@ -26,17 +26,10 @@ def compiled_run(law: Function, step: Function) -> Run | None:
     """What `closed_loop.simulate` may call for `law` and `step`; None without numba."""
     if find_spec("numba") is None:
         return None
-    import numba
-
     functions = _reached(law, _reached(step, {}))
     for function in functions:
         _make_callable(function)
-    plain = _make_loop(law, step)
-    plain.__qualname__ = f"loop_{_digest(functions)}"  # names the file that numba keeps
-    try:
-        loop: Function = numba.njit(cache=True)(plain)
-    except RuntimeError:  # no folder to keep it in
-        loop = numba.njit(plain)
+    loop = _compiled(_make_loop(law, step), "loop", functions)
 
     def run(
         controller: Any,
@@ -64,6 +57,32 @@ def compiled_run(law: Function, step: Function) -> Run | None:
         return rows, states
 
     return run
+
+
+@cache
+def machine_code(function: FunctionType) -> Function | None:
+    """A function of arrays and numbers that calls no other as machine code; None without numba.
+
+    What is divided by zero is as in NumPy: without a question, which would take most of the time.
+    """
+    if find_spec("numba") is None:
+        return None
+    copy = FunctionType(function.__code__, function.__globals__, function.__name__)
+    copy.__module__ = function.__module__
+    return _compiled(copy, function.__name__, [function], error_model="numpy")
+
+
+def _compiled(
+    plain: Function, name: str, functions: Iterable[FunctionType], **options: Any
+) -> Function:
+    import numba
+
+    plain.__qualname__ = f"{name}_{_digest(functions)}"  # names the file that numba keeps
+    try:
+        compiled: Function = numba.njit(cache=True, **options)(plain)
+    except RuntimeError:  # no folder to keep it in
+        compiled = numba.njit(**options)(plain)
+    return compiled
 
 
 @cache

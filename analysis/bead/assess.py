@@ -1,12 +1,14 @@
 """Photos to parts of results: measured, or refused with the reason."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
 from seamlog.errors import EvidenceError, ImageError, SeamlogError
 from seamlog.results import Figure, Part, Verdict
 
+from .loops import MANY, as_machine_code
 from .measurement import TRUSTED
 from .part import (
     BeadConfig,
@@ -76,10 +78,11 @@ def assess_photos(
     seam_mm: Points | None = None,
 ) -> list[AssessedPhoto]:
     """Part `bead` of each photo, indexed in order; a refused photo keeps its place."""
-    return [
-        _assess(source, start, config or BeadConfig(), index, weld, seam_mm)
-        for index, source in enumerate(sources, 1)
-    ]
+    with as_machine_code() if len(sources) >= MANY else nullcontext():
+        return [
+            _assess(source, start, config or BeadConfig(), index, weld, seam_mm)
+            for index, source in enumerate(sources, 1)
+        ]
 
 
 def _assess(

@@ -12,7 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from . import loops
 from .features import Features, Planes, in_spreads, planes_of
+from .loops import loaded
 from .series import median
 
 Floats = NDArray[np.float32]
@@ -63,30 +65,10 @@ class _Sums:
         count, rows, self.columns = planes.shape
         total = np.cumsum(np.stack([planes, planes * planes]), axis=3, dtype=np.float64)
         size = 3 * self.columns + 1
-        self._sums = np.zeros((2, count, rows, size), dtype=np.float32)
-        self._sums[..., self.columns + 1 : 2 * self.columns + 1] = total
-        self._sums[..., 2 * self.columns + 1 :] = total[..., -1:]
-        self._known = np.clip(np.arange(size) - self.columns, 0, self.columns).astype(np.float32)
-
-    def over(self, centres: range, start: int, stop: int) -> tuple[Floats, Floats]:
-        """Sums over the columns [c + start, c + stop) that there are, and how many, for each c.
-
-        Shapes (2, features, rows, c) and (c,).
-        """
-        before, up_to = self._slices(centres, start, stop)
-        sums = self._sums[..., up_to] - self._sums[..., before]
-        return sums, self._known[up_to] - self._known[before]
-
-    def roughness(self, centres: range, start: int, stop: int) -> Floats:
-        """Means of the last feature over columns [c + start, c + stop), (rows, c)."""
-        before, up_to = self._slices(centres, start, stop)
-        sums = self._sums[0, -1, :, up_to] - self._sums[0, -1, :, before]
-        sums /= np.maximum(self._known[up_to] - self._known[before], 1)
-        return np.asarray(sums)
-
-    def _slices(self, centres: range, start: int, stop: int) -> tuple[slice, slice]:
-        first, last = centres.start + self.columns, centres.stop + self.columns
-        return slice(first + start, last + start), slice(first + stop, last + stop)
+        self.sums = np.zeros((2, count, rows, size), dtype=np.float32)
+        self.sums[..., self.columns + 1 : 2 * self.columns + 1] = total
+        self.sums[..., 2 * self.columns + 1 :] = total[..., -1:]
+        self.known = np.clip(np.arange(size) - self.columns, 0, self.columns).astype(np.float32)
 
 
 def _saturate(square: Floats, half_at: float) -> Floats:
@@ -102,13 +84,19 @@ def edge_evidence(planes: Planes, reach: int) -> Floats:
     both = np.full(2 * reach, 0.5 / reach)
     change = _summed(planes, np.repeat([-1.0, 1.0], reach) / reach)
     mean, square = _summed(planes, both), _summed(planes * planes, both)
-    change *= change
-    spread = square - mean * mean - change / 4
-    change /= np.maximum(spread, 0, out=spread) + np.float32(_FLOOR)
     result = np.zeros((rows, columns + 1), dtype=np.float32)
     inner = slice(reach, columns - reach + 1)
-    result[:, inner] = _saturate(change.sum(axis=0)[:, inner], 1.5)
+    evident = loaded(loops.evident) or _evident
+    result[:, inner] = evident(change, mean, square, np.float32(_FLOOR))[:, inner]
     return result
+
+
+def _evident(change: Planes, mean: Planes, square: Planes, floor: np.float32) -> Floats:
+    """Evidence by the change between two windows, the mean of both and of their squares."""
+    change = change * change
+    spread = square - mean * mean - change / 4
+    change /= np.maximum(spread, 0, out=spread) + floor
+    return _saturate(change.sum(axis=0), 1.5)
 
 
 def _summed(planes: Planes, weights: NDArray[np.float64]) -> Planes:
@@ -125,17 +113,34 @@ def _contrast(sums: _Sums, centres: range, half: int) -> Floats:
     from looking like a band: its sides differ from each other more than from it. A band with more
     texture than its sides counts up to a quarter more.
     """
-    band, own = sums.over(centres, -half, half)
-    sides, known = sums.over(centres, -3 * half, 3 * half)
-    sides -= band
-    sides /= np.maximum(known - own, 1)
-    band /= own
+    where = centres.start + sums.columns, len(centres), half
+    contrasted = loaded(loops.contrasted) or _contrasted
+    contrast, rougher = contrasted(sums.sums, sums.known, *where, np.float32(2 * _FLOOR))
+    return np.asarray(contrast * (1 + 0.25 * np.tanh(rougher)))
+
+
+def _contrasted(
+    sums: Floats, known: Floats, start: int, count: int, half: int, floor: np.float32
+) -> tuple[Floats, Floats]:
+    """Contrast, and by how much the band is rougher than both its sides, (rows, count) each."""
+
+    def between(values: Floats, first: int, stop: int) -> Floats:
+        up_to, before = (slice(start + at, start + at + count) for at in (stop, first))
+        return np.asarray(values[..., up_to] - values[..., before])
+
+    band, own = between(sums, -half, half), between(known, -half, half)
+    sides = between(sums, -3 * half, 3 * half) - band
+    sides *= 1 / np.maximum(between(known, -3 * half, 3 * half) - own, 1)
+    band *= 1 / own
     (inside, square), (around, square_around) = band, sides
     twice_spread = square + square_around - inside * inside - around * around
-    change = (inside - around) ** 2 / (np.maximum(twice_spread, 0) + np.float32(2 * _FLOOR))
-    beside = (sums.roughness(centres, *side) for side in ((-3 * half, -half), (half, 3 * half)))
+    change = (inside - around) ** 2 / (np.maximum(twice_spread, 0) + floor)
+    beside = (
+        between(sums[0, -1], *side) * (1 / np.maximum(between(known, *side), 1))
+        for side in ((-3 * half, -half), (half, 3 * half))
+    )
     rougher = np.maximum(inside[-1] - np.maximum(*beside), 0)
-    return np.asarray(_saturate(change.sum(axis=0), 1.0) * (1 + 0.25 * np.tanh(rougher)))
+    return _saturate(change.sum(axis=0), 1.0), rougher
 
 
 class BandSearch:
@@ -202,7 +207,7 @@ class BandSearch:
         """
         sums = _Sums(planes)
         edges = np.maximum(edge_evidence(planes, 2), edge_evidence(planes, 4))
-        near = cv2.dilate(edges, np.ones((1, 3), np.uint8))
+        near = np.sqrt(np.sqrt(cv2.dilate(edges, np.ones((1, 3), np.uint8))))
         score = np.zeros((self.rows, *weight.shape), dtype=np.float32)
         whole = np.maximum(1, np.rint(self._halves)).astype(int)
         for half in np.unique(whole).tolist():
@@ -212,7 +217,7 @@ class BandSearch:
                 first, last = half + 1 + np.flatnonzero(counts)[[0, -1]]
                 at = range(first, last + 1)
                 left, right = (near[:, at.start + out : at.stop + out] for out in (-half, half))
-                found = _contrast(sums, at, half) * np.sqrt(np.sqrt(left * right))
+                found = _contrast(sums, at, half) * left * right
                 score[:, alike, at.start : at.stop] = (
                     found[:, None] * weight[alike, first : last + 1]
                 )
@@ -220,46 +225,59 @@ class BandSearch:
 
 
 def _trace(score: Floats, halves: Floats, slope: int) -> Band | None:
-    """Dynamic programming over the sections with free start and stop.
-
-    A row's states lie flat, their edges padded, so that a move is a shift.
-    """
-    rows, high, wide = score.shape
+    """Dynamic programming over the sections with free start and stop."""
+    rows, _, wide = score.shape
     stride = wide + 2 * slope
-    padded = np.full((rows, high + 2, stride), -np.inf, dtype=np.float32)
-    padded[:, 1:-1, slope : slope + wide] = score - np.float32(_EVIDENT)
-    gathered = padded.reshape(rows, -1)
-    for before, now in itertools.pairwise(gathered):
-        best = np.maximum(before[: -2 * stride], before[2 * stride :]) - np.float32(_WIDEN_COST)
-        np.maximum(best, before[stride:-stride], out=best)
-        for _ in range(slope):
-            moved = np.maximum(best[:-2], best[2:]) - np.float32(_MOVE_COST)
-            np.maximum(best[1:-1], moved, out=best[1:-1])
-        now[stride:-stride] += np.maximum(best, 0, out=best)
+    gather = loaded(loops.gathered) or _gathered
+    costs = (np.float32(_EVIDENT), np.float32(_WIDEN_COST), np.float32(_MOVE_COST))
+    gathered = gather(score, *costs, slope).reshape(rows, -1)
     ends = gathered.argmax(axis=1)
     totals = gathered[np.arange(rows), ends]
     last = int(totals.argmax())
     if totals[last] <= 0:
         return None
-    first, states = _walk_back(gathered[: last + 1], int(ends[last]), stride, slope)
+    dc, dh = (move.ravel() for move in np.mgrid[-slope : slope + 1, -1:2])
+    cost = (_MOVE_COST * abs(dc) + _WIDEN_COST * abs(dh)).astype(np.float32)
+    walk = loaded(loops.walked_back) or _walked_back
+    states = walk(gathered[: last + 1], int(ends[last]), dc + stride * dh, cost)[::-1]
+    first = last + 1 - len(states)
     h, c = states // stride - 1, states % stride - slope
     evidence = score[np.arange(first, last + 1), h, c].astype(np.float64)
     half = halves[h].astype(np.float64)
     return Band(first, last, c - half, c + half, evidence, float(totals[last]))
 
 
-def _walk_back(
-    gathered: Floats, end: int, stride: int, slope: int
-) -> tuple[int, NDArray[np.int64]]:
-    """First row of the sequence that leads to the state `end` of the last, and its states."""
-    dc, dh = (move.ravel() for move in np.mgrid[-slope : slope + 1, -1:2])
-    cost = (_MOVE_COST * abs(dc) + _WIDEN_COST * abs(dh)).astype(np.float32)
+def _gathered(
+    score: Floats, evident: np.float32, widen: np.float32, move: np.float32, slope: int
+) -> Floats:
+    """The most evidence gathered by each state, (rows, halves + 2, centres + 2 slope).
+
+    A row's states lie flat, their edges padded, so that a move is a shift.
+    """
+    rows, high, wide = score.shape
+    stride = wide + 2 * slope
+    padded = np.full((rows, high + 2, stride), -np.inf, dtype=np.float32)
+    padded[:, 1:-1, slope : slope + wide] = score - evident
+    for before, now in itertools.pairwise(padded.reshape(rows, -1)):
+        best = np.maximum(before[: -2 * stride], before[2 * stride :]) - widen
+        np.maximum(best, before[stride:-stride], out=best)
+        for _ in range(slope):
+            moved = np.maximum(best[:-2], best[2:]) - move
+            np.maximum(best[1:-1], moved, out=best[1:-1])
+        now[stride:-stride] += np.maximum(best, 0, out=best)
+    return padded
+
+
+def _walked_back(
+    gathered: Floats, end: int, moves: NDArray[np.int64], costs: Floats
+) -> NDArray[np.int64]:
+    """The states that lead to the state `end` of the last row, from it to the first."""
     states = [end]
     for before in gathered[-2::-1]:
-        came = states[-1] - dc - stride * dh
-        value = before[came] - cost
+        came = states[-1] - moves
+        value = before[came] - costs
         best = value.argmax()
         if value[best] <= 0:
             break
         states.append(came[best])
-    return len(gathered) - len(states), np.array(states[::-1])
+    return np.array(states)

@@ -3,6 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from . import loops
+from .loops import loaded
+
 
 def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int64]:
     """Column per row of each of n scores, shape (n, rows), moving at most one column per row.
@@ -10,6 +13,10 @@ def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int6
     `score`, (n, rows, columns), marks forbidden places by -inf. Chains are gathered from both ends
     at once, which takes half the steps, until they meet in the middle row.
     """
+    machine = loaded(loops.chains)
+    if machine is not None:
+        found: NDArray[np.int64] = machine(score, np.float32(move_cost))
+        return found
     count, rows, columns = score.shape
     middle = (rows - 1) // 2
     values = np.zeros((rows - middle, 2, count, columns + 2), dtype=np.float32)

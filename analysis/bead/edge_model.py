@@ -6,11 +6,13 @@ leave a plain step to each row, which is the least noisy thing to place.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from . import loops
 from .edge_shapes import (
     MODELS,
     Floats,
@@ -26,6 +28,7 @@ from .edge_shapes import (
     resolved,
     subspaces,
 )
+from .loops import loaded
 from .series import calmed
 
 Rows = NDArray[np.int64]
@@ -73,9 +76,19 @@ class EdgeModel:
 def profiles_at(signal: Projected, centre: Rows, window: Window) -> Projected:
     """Profiles (..., rows, window) around a column of each row, the bead to the right."""
     *stack, rows, width = signal.shape
-    columns = np.clip(centre[:, None] + window.columns.astype(np.int64), 0, width - 1)
+    size = window.outside + window.inside + 1
+    cut = loaded(loops.profiles) or _profiles
+    found = cut(signal.reshape(-1, rows, width), centre, window.outside, size)
+    return np.asarray(found).reshape(*stack, rows, size)
+
+
+def _profiles(signal: Projected, centre: Rows, outside: int, size: int) -> Projected:
+    stack, rows, width = signal.shape
+    columns = np.minimum(
+        np.maximum(centre[:, None] + np.arange(-outside, size - outside), 0), width - 1
+    )
     at = columns + (np.arange(rows) * width)[:, None]
-    return np.asarray(signal.reshape(*stack, -1).take(at, axis=-1))
+    return np.asarray(signal.reshape(stack, -1).take(at, axis=-1))
 
 
 def choose_model(signal: Projected, centre: Rows, window: Window) -> EdgeModel:
@@ -158,6 +171,7 @@ def _by_score(candidate: _Candidate) -> float:
     return candidate.score
 
 
+@cache
 def _price(window: Window) -> float:
     """How much lower (log) the misfit must be for each further parameter (Schwarz 1978)."""
     return float(np.log(window.size)) / window.size
@@ -199,10 +213,14 @@ def aligned_means(profiles: Profiles, shift: Floats) -> Floats:
 
 def moved(profiles: Profiles, shift: Floats) -> Profiles:
     """Profiles read `shift` columns further on (linear interpolation)."""
+    machine = loaded(loops.moved)
+    if machine is not None:
+        return np.asarray(machine(profiles, shift))
     rows, count = profiles.shape
     whole = np.floor(shift)
     columns = np.arange(count + 1) + whole.astype(np.int64)[:, None]
-    near = profiles.take(np.clip(columns, 0, count - 1) + (np.arange(rows) * count)[:, None])
+    columns = np.minimum(np.maximum(columns, 0), count - 1)
+    near = profiles.take(columns + (np.arange(rows) * count)[:, None])
     part = (shift - whole).astype(profiles.dtype)[:, None]
     return np.asarray(near[:, :-1] + part * (near[:, 1:] - near[:, :-1]))
 

@@ -6,6 +6,7 @@ least squares, Aitken 1936).
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -69,7 +70,6 @@ def _whitening(plain: Profiles, model: EdgeModel) -> Floats:
     window, blur = model.window, model.blur
     at = window.columns
     texture = plain - cv2.blur(plain, (1, _SLOW), borderType=cv2.BORDER_REPLICATE)
-    lags = np.abs(np.subtract.outer(np.arange(len(at)), np.arange(len(at))))
     # over rows that lie together: NumPy takes twice as long over each short one
     size = median(np.ptp(plain.T.copy(), axis=0))
     covariance = np.eye(len(at)) * (GREY_FLOOR + (EDGE_FLOOR * size) ** 2)
@@ -78,17 +78,22 @@ def _whitening(plain: Profiles, model: EdgeModel) -> Floats:
     bead = at > min(clear, window.inside - 2)
     for part, share in ((plate, 1 - step), (bead, step)):
         own = _autocovariance(texture[:, part], len(at))
-        covariance += own[lags] * np.sqrt(np.outer(share, share))
+        covariance += own[_lags(len(at))] * np.sqrt(np.outer(share, share))
     weight = window.weight
     return np.linalg.inv(np.linalg.cholesky(covariance / np.outer(weight, weight)))
+
+
+@cache
+def _lags(count: int) -> NDArray[np.int64]:
+    """How many columns each column is from each other."""
+    return np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
 
 
 def _autocovariance(texture: Profiles, lags: int) -> Floats:
     """Autocovariance across columns, biased so that it is positive definite, (lags,)."""
     rows, count = texture.shape
-    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     products = texture.T @ texture / (rows * count)
-    both = np.bincount(apart.ravel(), products.ravel(), minlength=lags)[:lags]
+    both = np.bincount(_lags(count).ravel(), products.ravel(), minlength=lags)[:lags]
     return np.asarray(both / np.where(np.arange(lags), 2, 1))
 
 

@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
+from . import loops
+from .loops import loaded
+
 Floats = NDArray[np.float64]
 Profiles = NDArray[np.floating[Any]]
 Projected = NDArray[np.float32]
@@ -65,7 +68,7 @@ class Window:
     @property
     def size(self) -> float:
         """Columns, each counted by the square of its weight."""
-        return float(self.weight @ self.weight)
+        return _size(self)
 
 
 @cache
@@ -74,6 +77,12 @@ def _weight(window: Window) -> Floats:
     share = np.where(at < 0, -at / (window.outside + 1), at / (window.inside + 1))
     fall = np.clip((share - 0.6) / 0.4, 0, 1)
     return np.asarray(0.55 + 0.45 * np.cos(np.pi * fall))
+
+
+@cache
+def _size(window: Window) -> float:
+    weight = _weight(window)
+    return float(weight @ weight)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,8 +227,8 @@ class Ruler:
         A step that falls towards the bead captures nothing.
         """
         weighted = profiles @ self.white
-        at, around = _highest(weighted @ self.steps)
-        places, most, curvature = _vertex(self.shifts, at, np.square(np.maximum(around, 0)))
+        captured = np.maximum(weighted @ self.steps, 0)
+        places, most, curvature = _vertices(captured, self.shifts, power=2)
         misfit = np.maximum(np.einsum("...n,...n->...", weighted, weighted) - most, 1e-9)
         return Fit(places, misfit, _STEP**2 / (-0.5 * curvature))
 
@@ -232,21 +241,27 @@ def even_ruler(window: Window, blur: float, reach: float) -> Ruler:
 
 def peak(energy: Projected, shifts: Floats) -> tuple[Floats, Floats, Floats]:
     """Shift (last axis) of the most energy, that energy, its (negative) second difference."""
-    return _vertex(shifts, *_highest(energy))
+    return _vertices(energy, shifts, power=1)
 
 
-def _highest(values: Profiles) -> tuple[NDArray[np.int64], Floats]:
-    """Where along the last axis values are highest, and they before, there and behind, (3, ...)."""
-    last = values.shape[-1]
-    at = np.clip(np.argmax(values, axis=-1), 1, last - 2)
-    flat = at + np.arange(at.size).reshape(at.shape) * last
-    return at, np.array([values.take(flat + k) for k in (-1, 0, 1)], dtype=np.float64)
+def _vertices(values: Profiles, shifts: Floats, power: int) -> tuple[Floats, Floats, Floats]:
+    """Parabolas through the highest values along the last axis and those beside them.
+
+    Of their `power`: where their vertex is, the highest value, their (negative) second difference.
+    """
+    flat = np.ascontiguousarray(values).reshape(-1, values.shape[-1])
+    found = (loaded(loops.vertices) or _vertices_of)(flat, shifts, power)
+    place, most, curvature = (one.reshape(values.shape[:-1]) for one in found)
+    return place, most, curvature
 
 
-def _vertex(shifts: Floats, at: NDArray[np.int64], around: Floats) -> tuple[Floats, Floats, Floats]:
-    a, b, c = around
+def _vertices_of(values: Profiles, shifts: Floats, power: int) -> tuple[Floats, Floats, Floats]:
+    count, last = values.shape
+    at = np.minimum(np.maximum(np.argmax(values, axis=1), 1), last - 2)
+    flat = at + np.arange(count) * last
+    a, b, c = np.array([values.take(flat + k) for k in (-1, 0, 1)], dtype=np.float64) ** power
     curvature = np.minimum(a - 2 * b + c, -1e-9)
-    move = np.clip(0.5 * (a - c) / curvature, -1, 1) * (shifts[1] - shifts[0])
+    move = np.minimum(np.maximum(0.5 * (a - c) / curvature, -1), 1) * (shifts[1] - shifts[0])
     return shifts[at] + move, b, curvature
 
 

@@ -36,8 +36,8 @@ must lie along a straight line."""
 _WINDOW_PX = 18
 _SEARCHED = 0.08
 """Half widths around the coarse toe in which the sharpest edge is looked for."""
-_TRIED_ROWS = 160
-"""Rows on which the colours, the averaging and the softness of a toe are tried."""
+_TRIED_ROWS, _SOFT_ROWS = 160, 80
+"""Rows on which the colours and the averaging of a toe are tried, and its softness."""
 _SENSOR_PX = 0.02
 """Noise that the place of any edge has by the pixels' raster, at the shortest averaging."""
 _RASTER_PX = 0.02
@@ -49,6 +49,7 @@ _LEAST_SMOOTHING = 1.0
 _MOST_SMEARED = 2.5
 """Waviness that was lost, in parts of what one more smoothing takes, at most."""
 _ENOUGH = 64
+_RISE = np.array([[-0.5, 0.0, 0.5]], dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +84,12 @@ def refine_toes(
 def _sharpest(signals: Signal, reach: float) -> Floats:
     """Chain of the steepest rises within reach of the middle column, for each of the signals."""
     smooth = [cv2.GaussianBlur(signal, (0, 0), sigmaX=1.5, sigmaY=1.0)[::2] for signal in signals]
-    rise = np.gradient(smooth, axis=2)
+    rise = np.stack([cv2.filter2D(one, -1, _RISE) for one in smooth])
     columns = np.arange(signals.shape[2])
     near = np.abs(columns - columns[-1] / 2) <= reach
-    typical = np.median(np.where(near, rise, 0).max(axis=2), axis=1)[:, None, None] + 1e-6
-    score = np.where(near, np.clip(rise / typical, 0, 1.5), -1e6).astype(np.float32)
+    typical = np.array([median(one) for one in np.where(near, rise, 0).max(axis=2)]) + 1e-6
+    score = rise / typical.astype(np.float32)[:, None, None]
+    score = np.where(near, np.minimum(np.maximum(score, 0), 1.5), np.float32(-1e6))
     rows = np.arange(signals.shape[1])
     return np.array([np.interp(rows, rows[::2], chain) for chain in best_chains(score, 0.1)])
 
@@ -157,7 +159,7 @@ class _Side:
         """Blur of the toe; that of single rows where their mean is soft, for a toe is ragged."""
         if model.blur <= _SHARP_PX:
             return model.blur
-        rows = spread(len(near), _TRIED_ROWS)
+        rows = spread(len(near), _SOFT_ROWS)
         profiles = profiles_at(signal[rows], np.rint(near[rows]).astype(np.int64), self._window)
         return typical_blur(profiles, self._window)
 

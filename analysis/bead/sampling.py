@@ -7,8 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from . import loops
 from .curve import Centreline
 from .image import Photo, opponent
+from .loops import loaded
 from .plane import Plane
 
 Floats = NDArray[np.float32]
@@ -74,17 +76,17 @@ def sample_rows(
     while 2 * factor <= min(blur, photo.width_px / _SMALLEST, photo.height_px / _SMALLEST):
         factor *= 2
     pixels = photo.reduced(factor)
-    x, inside, columns = _placed(x, photo.width_px, factor)
-    y, between, rows = _placed(y, photo.height_px, factor)
+    inside, columns = _place(x, photo.width_px, factor)
+    between, rows = _place(y, photo.height_px, factor)
     part = pixels[rows, columns] if factor > 1 else _deep(pixels[rows, columns])
     sampled = cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return opponent(sampled), inside & between
 
 
-def _placed(at: Floats, size: int, factor: int) -> tuple[Floats, NDArray[np.bool_], slice]:
-    """Coordinates along one side of the photo within a part of the reduced one, and that part.
+def _place(at: Floats, size: int, factor: int) -> tuple[NDArray[np.bool_], slice]:
+    """Make coordinates along one side of the photo those within a part of the reduced one.
 
-    Between them, which coordinates lie in the photo.
+    Which of them lie in the photo, and that part.
     """
     low, high = float(at.min()), float(at.max())
     inside = np.ones(at.shape, dtype=bool)
@@ -92,8 +94,12 @@ def _placed(at: Floats, size: int, factor: int) -> tuple[Floats, NDArray[np.bool
         inside = (at >= 0) & (at <= size - 1)
     first = min(max(int(low / factor) - 3, 0), size // factor - _SMALLEST)
     last = max(int(high / factor) + 5, first + _SMALLEST)
-    at = (at + np.float32(0.5)) / np.float32(factor) - np.float32(first + 0.5)
-    return at, inside, slice(first, last)
+    if factor > 1:
+        at += np.float32(0.5)
+        at /= np.float32(factor)
+        at -= np.float32(0.5)
+    at -= np.float32(first)
+    return inside, slice(first, last)
 
 
 def _deep(pixels: NDArray[Any]) -> NDArray[Any]:
@@ -111,9 +117,16 @@ def _maps(
     start = line.points + first[:, None] * line.normals
     base = start @ matrix[:, :2].T + matrix[:, 2]
     slope = step * line.normals @ matrix[:, :2].T
-    along = np.vstack([np.ones(count), np.arange(count)]).astype(np.float32)
-    x, y, w = (
-        np.column_stack([base[:, k], slope[:, k]]).astype(np.float32) @ along for k in range(3)
-    )
-    x, y = plane.through_lens(x / w, y / w)
+    project = loaded(loops.projected) or _projected
+    x, y = project(base.astype(np.float32), slope.astype(np.float32), count)
+    x, y = plane.through_lens(x, y)
     return np.asarray(x, dtype=np.float32), np.asarray(y, dtype=np.float32)
+
+
+def _projected(base: Floats, slope: Floats, count: int) -> tuple[Floats, Floats]:
+    """What `base` (rows, 3) and `count` steps of `slope` are in homogeneous coordinates: x, y."""
+    at = np.arange(count, dtype=np.float32)
+    x, y, w = (base[:, k, None] + slope[:, k, None] * at for k in range(3))
+    x /= w
+    y /= w
+    return x, y

@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError
 
+from . import loops
 from .band import edge_evidence
 from .chain import best_chains
 from .features import Features, Planes, in_spreads, planes_of, smoothed
+from .loops import loaded
 from .series import median
-from .zones import Looks, looks_of, zone
+from .zones import Looks, Shares, Zone, looks_of
 
 Floats = NDArray[np.float64]
 
@@ -70,18 +72,22 @@ def find_toes(look: StripLook, rough: Extent, freedom: float, beyond: float) -> 
     """
     valid, columns = look.valid, look.valid.shape[1]
     half = median(rough.half)
-    inside = rough.middle - _CORE * rough.half, rough.middle + _CORE * rough.half
-    bead = look.looks.shares(zone(columns, *inside, valid))
-    core = zone(columns, rough.middle - 0.7 * half, rough.middle + 0.7 * half, valid)
+    inside = Zone.between(
+        rough.middle - _CORE * rough.half, rough.middle + _CORE * rough.half, valid
+    )
+    bead = look.looks.shares(inside)
+    core = Zone.between(rough.middle - 0.7 * half, rough.middle + 0.7 * half, valid).mask()
     reach = freedom * half + 2
     windows = _windows(columns, rough, reach)
+    score = loaded(loops.scored) or _score
     scores, present = [], np.full(len(rough.left), np.inf)
     for side, edge, window in zip((-1, 1), (rough.left, rough.right), windows, strict=True):
-        plate = look.looks.shares(_plate(columns, edge, side, half, beyond, valid))
+        plate = _plate(look, edge, side, half, beyond)
         like = look.looks.likeness(bead, plate).reshape(valid.shape)
         like *= valid
-        near = np.abs(np.arange(window.start, window.stop) - edge[:, None]) <= reach
-        scores.append(_score(like[:, window], look.edges[:, window], side, half, near))
+        gain = np.float32(side / max(4.0, 0.12 * half))
+        where = window.start, window.stop - window.start, reach
+        scores.append(score(like, look.edges, edge, *where, gain, np.float32(_EDGE)))
         present = np.minimum(present, (core * like).sum(axis=1))
     left, right = best_chains(np.stack(scores), _MOVE).astype(np.float64)
     present /= np.maximum(np.count_nonzero(core, axis=1), 1)
@@ -97,10 +103,8 @@ def _windows(columns: int, rough: Extent, reach: float) -> list[slice]:
     return [slice(first, first + size) for first in firsts]
 
 
-def _plate(
-    columns: int, edge: Floats, side: int, half: float, beyond: float, valid: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """The plate beside one toe.
+def _plate(look: StripLook, edge: Floats, side: int, half: float, beyond: float) -> Shares:
+    """The looks of the plate beside one toe.
 
     Nearest to it slag and spatter may belong to either, so that part counts only where the photo
     holds no other plate.
@@ -108,9 +112,9 @@ def _plate(
     reach = _BESIDE * half + 4
     for first in (1 + beyond * half, 1.0):
         bounds = (edge + first, edge + reach) if side > 0 else (edge - reach, edge - first)
-        mask = zone(columns, *bounds, valid)
-        if mask.sum() >= _ENOUGH:
-            return mask
+        plate = look.looks.shares(Zone.between(*bounds, look.valid))
+        if plate.places >= _ENOUGH:
+            return plate
     raise EvidenceError(
         "the plate beside the bead is not in the photo, so its toe cannot be told; "
         "take the photo with plate on both sides"
@@ -126,13 +130,20 @@ def _edges(planes: Planes) -> NDArray[np.float32]:
 def _score(
     like: NDArray[np.float32],
     edges: NDArray[np.float32],
-    side: int,
-    half: float,
-    near: NDArray[np.bool_],
+    toe: Floats,
+    start: int,
+    columns: int,
+    reach: float,
+    gain: np.float32,
+    weight: np.float32,
 ) -> NDArray[np.float32]:
-    """How well a toe at each column splits bead-like from plate-like places and is sharp."""
-    score = np.cumsum(like, axis=1)
-    score *= np.float32(side / max(4.0, 0.12 * half))
-    score += np.float32(_EDGE) * edges
-    score = np.where(near, score, np.float32(-1e6))
+    """How well a toe at each of `columns` from `start` on splits bead-like from plate-like places.
+
+    And how sharp it is there; farther than `reach` from `toe` there is none.
+    """
+    at = np.arange(start, start + columns)
+    score = np.cumsum(like[:, at[0] : at[-1] + 1], axis=1)
+    score *= gain
+    score += weight * edges[:, at[0] : at[-1] + 1]
+    score = np.where(np.abs(at - toe[:, None]) <= reach, score, np.float32(-1e6))
     return np.asarray(score - score.max(axis=1, keepdims=True))

@@ -152,15 +152,19 @@ def _reasons(
     left: Toes, right: Toes, width: Floats, typical: float, line: Centreline
 ) -> NDArray[np.str_]:
     """Why a row is not to be trusted, or ''."""
-    reasons = np.full(len(width), "", dtype="U40")
+    found = []
     for name, toe in (("left", left), ("right", right)):
-        reasons[_strays(toe.offset, typical, line) | ~toe.within] = f"{name} toe strays"
-        reasons[toe.u_noise > _FAINT * typical] = f"{name} toe too faint"
-        reasons[_faint(toe.height)] = f"{name} toe not told from the plate"
-        reasons[~toe.in_frame] = f"{name} toe at the frame of the photo"
-    reasons[left.present < 0] = "no bead seen"
-    reasons[width <= 0] = "no width"
-    return reasons
+        found += [
+            (f"{name} toe strays", _strays(toe.offset, typical, line) | ~toe.within),
+            (f"{name} toe too faint", toe.u_noise > _FAINT * typical),
+            (f"{name} toe not told from the plate", _faint(toe.height)),
+            (f"{name} toe at the frame of the photo", ~toe.in_frame),
+        ]
+    found += [("no bead seen", left.present < 0), ("no width", width <= 0)]
+    reason = np.zeros(len(width), dtype=np.int64)
+    for number, (_, rows) in enumerate(found, 1):
+        reason[rows] = number
+    return np.array(["", *(sentence for sentence, _ in found), END])[reason]
 
 
 def _faint(height: Floats) -> NDArray[np.bool_]:

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from . import loops
 from .features import Features, Planes, quantiles
+from .loops import loaded
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -37,15 +39,28 @@ def look_of(samples: Features) -> Look:
         raise ValueError("too few samples for a zone")
     floors = np.full(samples.shape[1], 4.0)
     floors[0], floors[-1] = 9.0, 0.02
-    covariance = np.cov(samples.T.astype(np.float64)).reshape(len(floors), len(floors))
-    return Look(samples.mean(axis=0, dtype=np.float64), covariance + np.diag(floors))
+    mean = samples.mean(axis=0, dtype=np.float64)
+    apart = samples - mean
+    return Look(mean, apart.T @ apart / (len(samples) - 1) + np.diag(floors))
 
 
-def zone(columns: int, start: Floats, stop: Floats, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mask of columns in [start, stop) per row, where the photo has samples."""
-    at = np.arange(columns, dtype=np.int32)
-    first, end = (np.ceil(bound).astype(np.int32)[:, None] for bound in (start, stop))
-    return (at >= first) & (at < end) & valid
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """Columns [first, end) per row, where the photo has samples."""
+
+    first: Places
+    end: Places
+    valid: NDArray[np.bool_]
+
+    @classmethod
+    def between(cls, start: Floats, stop: Floats, valid: NDArray[np.bool_]) -> "Zone":
+        """Columns in [start, stop) per row."""
+        return cls(np.ceil(start).astype(np.int64), np.ceil(stop).astype(np.int64), valid)
+
+    def mask(self) -> NDArray[np.bool_]:
+        """Whether each place belongs to it."""
+        at = np.arange(self.valid.shape[1])
+        return (at >= self.first[:, None]) & (at < self.end[:, None]) & self.valid
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,22 +74,51 @@ class Looks:
     channels: int
     texture: Places
 
-    def shares(self, mask: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-        """How often each look occurs in a zone: colours and texture, smoothed."""
-        at = np.flatnonzero(mask)
-        return _shares(self.colours.take(at), self.channels), _shares(self.texture.take(at), 1)
+    def shares(self, zone: Zone) -> "Shares":
+        """How often each look occurs in a zone."""
+        count = loaded(loops.counted)
+        if count is not None:
+            where = zone.first, zone.end, zone.valid
+            colours = count(self.colours, *where, _BINS**self.channels)
+            texture = count(self.texture, *where, _BINS)
+        else:
+            at = np.flatnonzero(zone.mask())
+            colours = np.bincount(self.colours.take(at), minlength=_BINS**self.channels)
+            texture = np.bincount(self.texture.take(at), minlength=_BINS)
+        return Shares(_shares(colours, self.channels), _shares(texture, 1), int(texture.sum()))
 
-    def likeness(
-        self, inside: tuple[Floats, Floats], outside: tuple[Floats, Floats]
-    ) -> NDArray[np.float32]:
+    def likeness(self, inside: "Shares", outside: "Shares") -> NDArray[np.float32]:
         """Log-likelihood ratio inside : outside per place (n,), by the shares in two zones.
 
         Texture weighs less than colours. Clipped, so that no place decides alone.
         """
-        colours, texture = (np.log(a / b) for a, b in zip(inside, outside, strict=True))
-        ratio = colours.astype(np.float32).take(self.colours)
-        ratio += (_TEXTURE * texture).astype(np.float32).take(self.texture)
-        return np.clip(ratio, -_CLIP, _CLIP, out=ratio)
+        colours = np.log(inside.colours / outside.colours).astype(np.float32)
+        texture = (_TEXTURE * np.log(inside.texture / outside.texture)).astype(np.float32)
+        look_up = loaded(loops.looked_up) or _looked_up
+        found = look_up(self.colours, self.texture, colours, texture, np.float32(_CLIP))
+        return np.asarray(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """How often each look of colours and of texture occurs in a zone, smoothed; its places."""
+
+    colours: Floats
+    texture: Floats
+    places: int
+
+
+def _looked_up(
+    colours: Places,
+    texture: Places,
+    by_colour: NDArray[np.float32],
+    by_texture: NDArray[np.float32],
+    most: np.float32,
+) -> NDArray[np.float32]:
+    """Sums of what is said of each place's colours and of its texture, clipped."""
+    found = by_colour.take(colours)
+    found += by_texture.take(texture)
+    return np.clip(found, -most, most, out=found)
 
 
 def looks_of(planes: Planes) -> Looks:
@@ -92,12 +136,13 @@ def _bins(plane: NDArray[np.float32]) -> Places:
     return np.clip(bins, 0, _BINS - 1, out=bins).astype(np.int64)
 
 
-def _shares(places: Places, channels: int) -> Floats:
+def _shares(counted: Places, channels: int) -> Floats:
     """How often each bin of a smoothed histogram occurs, flat."""
-    counted = np.bincount(places, minlength=_BINS**channels).astype(np.float64)
+    places = counted.sum()
+    smooth = counted.astype(np.float64)
     for _ in range(channels):
-        counted = (_SMOOTHING @ counted.reshape(_BINS, -1)).T
-    return np.asarray(counted.ravel() / max(len(places), 1e-6) + _RARE)
+        smooth = (_SMOOTHING @ smooth.reshape(_BINS, -1)).T
+    return np.asarray(smooth.ravel() / max(places, 1e-6) + _RARE)
 
 
 def fisher_direction(inside: Features, outside: Features) -> tuple[Floats, float]:
