@@ -1,7 +1,8 @@
 """Bead width on real photos, against contours that people drew around the beads (SEAMLOG_DATA).
 
 A person's width is taken across the bead's axis, every 4 px along it, from toe to toe; ours are
-averaged in the same slices. Each photo is measured by both definitions of the toe.
+averaged in the same slices. Each photo is measured by both definitions of the toe, and by the
+first along a path that wanders in the bead, as a session would give it.
 """
 
 import csv
@@ -28,6 +29,8 @@ Floats = NDArray[np.float64]
 
 SLICE_PX = 4
 LEAST_SLICES = 20
+WANDER, PHASES = 0.12, (0.0, 2.0)
+"""How far a given path wanders, in widths, and where each of two such paths begins to."""
 FAR_PERCENT = 25
 """An error beyond which a width must not be trusted."""
 
@@ -99,11 +102,16 @@ def contours() -> Iterator[Contour]:
             yield Contour(path, polygons, float(row["axis_deg"]), mean_px)
 
 
-def compare(contour: Contour, toe: str) -> Compared:
-    """Measure a photo and compare."""
+def compare(contour: Contour, toe: str, phase: float | None = None) -> Compared:
+    """Measure a photo and compare; with a `phase` along the bead's middle, wandering from it."""
     name, photo = contour.path.stem, load_photo(contour.path)
+    plane = plane_of(photo, None)
     try:
-        bead = measure_strip(photo, plane_of(photo, None), toe=toe)
+        bead = measure_strip(photo, plane, toe=toe)
+        if phase is not None:
+            middle = bead.centre_px[:: len(bead.centre_px) // 40]
+            wander = WANDER * contour.mean_width_px * np.sin(np.linspace(0, 9, len(middle)) + phase)
+            bead = measure_strip(photo, plane, middle + wander[:, None] * (0.3, 1.0), toe=toe)
     except SeamlogError:
         return Compared(name, toe, contour.mean_width_px)
     even = uniformity(bead)
@@ -126,12 +134,11 @@ def correlation(contour: Contour, bead: BeadMeasurement) -> float:
     return float(np.corrcoef(np.array(pairs).T)[0, 1])
 
 
-def figures_of(toe: str, found: list[Compared]) -> list[Figure]:
+def figures_of(toe: str, found: list[Compared], needed: str = "") -> list[Figure]:
     """Summary of all photos by one definition of the toe."""
     errors = np.abs([each.error_percent for each in found])
     sure = np.array([each.verdict == "trusted" for each in found])
     far = int((sure & (errors > FAR_PERCENT)).sum())
-    needed = f">= {round(len(found) * 12 / 17)}"
     typical = float(np.nanmedian(errors[sure])) if sure.any() else np.nan
     worst = float(np.nanmax(errors[sure])) if sure.any() else np.nan
     return [
@@ -179,7 +186,13 @@ def main() -> None:
                 sys.stdout.write(json.dumps(row) + "\n")
         else:
             sys.stdout.write("\n" + "\n".join(table(found)) + "\n")
-        tell(f"Toe: {toe}", figures_of(toe, found), chosen.json)
+        tell(
+            f"Toe: {toe}", figures_of(toe, found, f">= {round(len(found) * 12 / 17)}"), chosen.json
+        )
+    toe = next(iter(TOES))
+    given = [compare(contour, toe, phase) for phase in PHASES for contour in drawn]
+    title = f"{toe}, paths given"
+    tell(f"Toe: {title}", figures_of(title, given), chosen.json)
 
 
 if __name__ == "__main__":

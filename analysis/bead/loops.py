@@ -1,7 +1,7 @@
 """The bead's innermost loops as machine code (numba, extra `fast`), for who measures many photos.
 
-NumPy spends most of a bead's time on its price per call. To load the machine code takes half a
-second, as long as it saves on some 100 photos, so it is used within `as_machine_code` only. The
+NumPy spends most of a bead's time on its price per call. To load the machine code takes a third
+of a second, as long as it saves on some 50 photos, so it is used within `as_machine_code` only. The
 results are the same to the bit.
 """
 
@@ -17,7 +17,7 @@ from seamlog.analysis.compiled import machine_code
 Floats = NDArray[np.float32]
 Rows = NDArray[np.int64]
 
-MANY = 100
+MANY = 60
 """Photos from which on loading the machine code pays."""
 _used: dict[str, Callable[..., Any]] = {}
 
