@@ -47,8 +47,8 @@ def sample_strip(
 ) -> Strip:
     """Sample the photo along `line`, `reach` to both sides, every `step` across.
 
-    `blur` is the length of a step in photo px: above 1 the photo is averaged so that no detail
-    falls between the samples.
+    `blur` is the length of a step in photo px: from 2 on the photo is halved, as often as samples
+    still lie at most two of its pixels apart.
     """
     count = int(np.ceil(reach / step))
     offsets = np.arange(-count, count + 1, dtype=np.float64) * step

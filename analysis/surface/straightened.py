@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from seamlog.analysis.bead.curve import Centreline, fit_centreline
-from seamlog.analysis.bead.image import Photo
+from seamlog.analysis.bead.image import Photo, make_photo
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead.plane import Plane
 from seamlog.analysis.bead.sampling import Strip, sample_strip
@@ -64,7 +64,10 @@ def straightened(photo: Photo, plane: Plane, bead: BeadMeasurement) -> StraightB
     step = max(bead.unit_per_px, width / COLUMNS)
     path = plane.to_plane(bead.centre_px[known])
     line = fit_centreline(path, step, _STIFF * width)
-    strip = sample_strip(photo, plane, line, 0.75 * width, step, blur=step / bead.unit_per_px)
+    blur = step / bead.unit_per_px
+    if blur > 1.3 * 2 ** np.floor(np.log2(blur)):  # more than halving the photo averages away
+        photo = make_photo(cv2.GaussianBlur(photo.pixels, (0, 0), 0.4 * blur), photo.name)
+    strip = sample_strip(photo, plane, line, 0.75 * width, step, blur=blur)
     light = np.ascontiguousarray(strip.opponent[..., 0])
     inside = _between_toes(strip, plane, bead, known, path, line) & strip.valid
     columns = width / step
