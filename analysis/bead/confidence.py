@@ -35,12 +35,12 @@ class Evidence:
     `apart`: distance of bead and plate at the worse toe, in standard deviations. `band`: evidence
     of the coarse band, 0 to 1. `flagged`: part of the stations. `rival` and `inner`: evidence of
     the best band beside and inside the found one, relative to it; `flank`: how much rougher the
-    surface beside the inner one is than the plate (inf: not looked for). `nested`: confidence in
-    the more evident band that it lies inside (0: in none); `sharper`: how many times sharper than
-    its toes a band inside is (0: none, or not looked for). `step_grey`: the weaker toe's step in
-    grey levels; `lengths`: length of the bead in widths (inf where it runs out of the photo at both
-    ends). `width_px`; `astray`: distance between the sharpest edge and the change of looks, part of
-    the width; `blur_px` of the sharper toe.
+    surface beside the inner one is than the plate (inf: not looked for). `nested`: how sure it is
+    that the more evident band that it lies inside is no tint (0: it lies in none); `sharper`: how
+    many times sharper than its toes a band inside is (0: none, or not looked for). `step_grey`: the
+    weaker toe's step in grey levels; `lengths`: length of the bead in widths (inf where it runs out
+    of the photo at both ends). `width_px`; `astray`: distance between the sharpest edge and the
+    change of looks, part of the width; `blur_px` of the sharper toe.
     """
 
     apart: float
@@ -66,23 +66,31 @@ class Doubt:
     sentence: str
 
 
-def doubts(evidence: Evidence) -> list[Doubt]:
-    """All doubts, the worst first."""
-    e = evidence
+def tint(e: Evidence) -> tuple[float, str]:
+    """How much speaks for a heat tint around the bead, 0 to 1, and what."""
     inside = max(np.clip((e.inner - _INNER) / 0.2, 0, 1), np.clip((e.sharper - 1.5) / 0.5, 0, 1))
     soft = np.clip((e.blur_px - soft_px(e.width_px)) / 2.0, 0, 1)
-    less_sharp = np.clip(e.blur_px - _sharp_px(e.width_px), 0, 1)
     film = np.clip((e.inner - _INNER) / 0.15, 0, 1) * np.clip((1.6 - e.flank) / 0.3, 0, 1)
     soft_at_all = np.clip((e.blur_px - soft_px(e.width_px)) / 0.5, 0, 1)
     alike = np.clip((1.8 - e.flank) / 0.3, 0, 1)
-    faded = (
-        soft_at_all
-        * alike
-        * max(np.clip((e.inner - 0.5) / 0.15, 0, 1), np.clip((e.sharper - 1) / 0.3, 0, 1))
-    )
+    faded = max(np.clip((e.inner - 0.5) / 0.15, 0, 1), np.clip((e.sharper - 1) / 0.3, 0, 1))
     # Soft toes of a surface rougher than the plate are out of focus or ragged, no fading tint.
     smooth = 1.0 if np.isinf(e.flank) else np.clip((2.6 - e.flank) / 0.8, 0, 1)
-    tinted = max(smooth * max(0.5 * soft, inside * less_sharp), film, faded)
+    edges = smooth * max(0.5 * soft, inside * _less_sharp(e))
+    tinted = max(edges, film, soft_at_all * alike * faded)
+    what = "its edges are soft" if film < tinted else "the surface is as on the plate"
+    return float(tinted), f"a narrower band lies inside, and {what}: a heat tint?"
+
+
+def _less_sharp(e: Evidence) -> float:
+    return float(np.clip(e.blur_px - _sharp_px(e.width_px), 0, 1))
+
+
+def doubts(evidence: Evidence) -> list[Doubt]:
+    """All doubts, the worst first."""
+    e = evidence
+    less_sharp = _less_sharp(e)
+    tinted, looks_tinted = tint(e)
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),
@@ -96,12 +104,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
             max(0.45, 1 - max(e.nested, less_sharp * (e.nested > 0)) * (0.5 + 0.5 * less_sharp)),
             "it lies inside a broader band that is as evident: a heat tint?",
         ),
-        (
-            1 - 0.75 * tinted,
-            "a narrower band lies inside, and its edges are soft: a heat tint?"
-            if film < tinted
-            else "a narrower band lies inside, and the surface is as on the plate: a heat tint?",
-        ),
+        (1 - 0.75 * tinted, looks_tinted),
     ]
     judged = [Doubt(float(np.clip(value, 0, 1)), sentence) for value, sentence in found]
     return sorted(judged, key=lambda doubt: doubt.confidence)

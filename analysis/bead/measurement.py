@@ -28,7 +28,8 @@ class BeadMeasurement:
     Arrays have one entry per station. `s` is arc length from the bead's start in the photo (see
     `starts_at`); `width` and `u_width` are NaN where no toe was seen; `u_noise` is the random part
     of `u_width`. `left_px`, `right_px`, `centre_px` have shape (n, 2): x, y in the photo. A flagged
-    station carries its `reason`. `confidence` is 0 to 1. `starts_at` is the end of the photo that
+    station carries its `reason`. `confidence` is 0 to 1; `tint` how much speaks for a heat tint
+    around the bead instead of the bead, 0 to 1. `starts_at` is the end of the photo that
     s = 0 lies at, `direction_known` whether somebody said so; `open_start` and `open_stop` tell
     that the bead runs out of the frame there.
     """
@@ -51,6 +52,7 @@ class BeadMeasurement:
     open_start: bool
     open_stop: bool
     toe_definition: str = TOES["metal"]
+    tint: float = 0.0
 
     @property
     def good(self) -> NDArray[np.bool_]:

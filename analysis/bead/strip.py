@@ -114,7 +114,7 @@ def _most_trusted(
     refusal: Exception | None = None
     for path in paths:
         if path.band.nested and best is not None:
-            path = replace(path, band=replace(path.band, nested=best.confidence))
+            path = replace(path, band=replace(path.band, nested=1 - best.tint))
         try:
             measured = _measure(photo, plane, path, start, tracing)
         except (EvidenceError, ImageError) as error:

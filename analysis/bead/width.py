@@ -8,7 +8,7 @@ from scipy.ndimage import median_filter
 
 from seamlog.errors import EvidenceError
 
-from .confidence import Doubt, Evidence, confidence, doubts, serious
+from .confidence import Doubt, Evidence, confidence, doubts, serious, tint
 from .curve import Centreline
 from .image import Photo
 from .measurement import END, TRUSTED, BeadMeasurement
@@ -86,7 +86,8 @@ def assemble(
     ends = [_at_frame(photo, centre_px[end], typical / unit) for end in _ends_of(bead)]
     length = np.inf if all(ends) else float(np.ptp(line.s[bead]))
     weak = flagged | _faint(left.bare) | _faint(right.bare)
-    found = doubts(_evidence(toes, weak[bead], typical, band, unit, length))
+    evidence = _evidence(toes, weak[bead], typical, band, unit, length)
+    found = doubts(evidence)
     sure = confidence(found)
     if found[0].confidence < _REFUSED:
         raise EvidenceError(
@@ -117,6 +118,7 @@ def assemble(
         direction_known=start is not None,
         open_start=_at_frame(photo, centre_px[bead][order][0], typical / unit),
         open_stop=_at_frame(photo, centre_px[bead][order][-1], typical / unit),
+        tint=tint(evidence)[0],
     )
 
 
