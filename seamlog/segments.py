@@ -44,24 +44,31 @@ def find_segments(path: str | Path | Sequence[str | Path], limits: Limits) -> li
 
 
 def _siblings(path: Path) -> list[Path]:
+    return [item for item in _stored(path) if item != path]
+
+
+def _stored(path: Path) -> list[Path]:
+    """The files beside `path` that have its name but for the number; `path` itself is one."""
     match = _SEGMENT.fullmatch(path.name)
     if match is None:
-        return []
-    found = [item for item in sorted(path.parent.iterdir()) if _is_stored(item)]
-    return [
-        item
-        for item in found
-        if item != path
-        and (other := _SEGMENT.fullmatch(item.name))
-        and other["stem"] == match["stem"]
-    ]
+        return [path] if path.exists() else []
+    while True:
+        mine = [
+            item
+            for item in sorted(path.parent.iterdir())
+            if (other := _SEGMENT.fullmatch(item.name)) and other["stem"] == match["stem"]
+        ]
+        try:
+            return [item for item in mine if _is_stored(item, mine)]
+        except FileNotFoundError:  # it got its final name since the folder was listed
+            continue
 
 
-def _is_stored(path: Path) -> bool:
+def _is_stored(path: Path, listed: Sequence[Path]) -> bool:
     """Not the unfinished name of a file that is finished beside it, nor one just begun."""
     if path.suffix != ".part":
         return True
-    return not path.with_suffix("").exists() and path.stat().st_size > 0
+    return path.with_suffix("") not in listed and path.stat().st_size > 0
 
 
 def grown_segments(files: Sequence[McapFile], limits: Limits) -> list[McapFile] | None:
@@ -70,13 +77,22 @@ def grown_segments(files: Sequence[McapFile], limits: Limits) -> list[McapFile] 
     Files that are as they were stay open and are the same objects; the others are closed.
     """
     known = {file.path: file for file in files}
-    first = files[0].path
-    there = [path for path in (first, *_siblings(first)) if path.exists() and _is_stored(path)]
-    changed = [path for path in there if _size(known.get(path)) != path.stat().st_size]
-    if not changed and all(path in there for path in known):
-        return None
+    first, opened = files[0].path, list[McapFile]()
+    there = _stored(first)
+    if len(there) < len(known):  # a listing can miss a file that gets its final name meanwhile
+        there = _stored(first)
+    if not there:
+        raise SessionError(f"{first} and all other files of the recording are gone")
+    try:
+        changed = [path for path in there if _size(known.get(path)) != path.stat().st_size]
+        if not changed and all(path in there for path in known):
+            return None
+        opened += (other for path in changed if (other := _opened(path, files[0], limits)))
+    except FileNotFoundError:  # one got its final name meanwhile
+        for file in opened:
+            file.close()
+        return grown_segments(files, limits)
     recording = _identity(files[0])[0]
-    opened = [other for path in changed if (other := _opened(path, files[0], limits))]
     same = [file for path, file in known.items() if path in there and path not in changed]
     mine = [file for file in opened if _identity(file)[0] == recording]
     for file in {*files, *opened} - {*same, *mine}:

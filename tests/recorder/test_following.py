@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -49,6 +50,30 @@ def test_a_session_grows_while_it_is_recorded(tmp_path: Path, segment_s: float) 
         assert session.metadata["seamlog.recording.end"] == {"ending": "closed"}
         assert not session.grow()
     assert (len(status.files) > 1) == (segment_s < 1)
+
+
+def test_a_session_grows_while_its_file_gets_another_name(tmp_path: Path) -> None:
+    path = tmp_path / "weld.mcap"
+    with Recorder(path) as recorder:
+        recorder.channel(TOPIC).put(0, 0.0, 0.0)
+    unfinished = path.with_name(path.name + ".part")
+    ended = threading.Event()
+
+    def rename() -> None:
+        while not ended.is_set():
+            path.rename(unfinished)
+            unfinished.rename(path)
+
+    with open_session(path) as session:
+        renaming = threading.Thread(target=rename)
+        renaming.start()
+        try:
+            for _ in range(300):
+                session.grow()
+                assert session.columns(TOPIC)["stamp_ns"].tolist() == [0]
+        finally:
+            ended.set()
+            renaming.join()
 
 
 def test_info_follows_until_the_end(tmp_path: Path) -> None:

@@ -5,12 +5,11 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from seamlog.analysis.bead.assess import AssessedPhoto, assess_photos
-from seamlog.analysis.bead.image import load_photo, make_photo
+from seamlog.analysis.bead.image import load_photo
 from seamlog.analysis.bead.measurement import TRUSTED, BeadMeasurement
 from seamlog.analysis.bead.plane import plane_of
 from seamlog.analysis.bead.sources import photo_files
@@ -81,15 +80,6 @@ def test_a_given_path_leads_to_the_same_bead(human_widths: dict[Path, float]) ->
         assert abs(error) <= WORST_TRUSTED or not given.trusted, path.stem
         errors.append(abs(error))
     assert np.median(errors) <= MEDIAN_ERROR
-
-
-def test_no_trusted_width_is_far_off_without_colours(human_widths: dict[Path, float]) -> None:
-    """In grey the toes are harder to tell, and more of what is found is found wrongly."""
-    for path, human_px in human_widths.items():
-        photo = make_photo(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), path.stem)
-        found = measure_strip(photo, plane_of(photo, None))
-        error = found.width[found.good].mean() / human_px - 1
-        assert abs(error) <= WORST_TRUSTED or not found.trusted, path.stem
 
 
 @pytest.mark.parametrize("name", TINTED)
