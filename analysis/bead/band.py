@@ -48,9 +48,14 @@ class Band:
     evidence: NDArray[np.float64]
     total: float
 
+    @property
+    def middle(self) -> NDArray[np.float64]:
+        """Column of its middle."""
+        return (self.left + self.right) / 2
+
 
 def relative(other: Band | None, band: Band) -> float:
-    """How evident another band is, 0 to 1, if it is less so than `band`."""
+    """Evidence of another band as a part of that of `band`; 0 without another one."""
     return other.total / band.total if other else 0.0
 
 
@@ -197,7 +202,7 @@ class BandSearch:
     def _away(self, band: Band) -> NDArray[np.float64]:
         """Distance of each column edge from the band's middle, in half widths, by row of it."""
         columns = np.arange(self.columns + 1)
-        distance = np.abs(columns - (band.right + band.left)[:, None] / 2)
+        distance = np.abs(columns - band.middle[:, None])
         return np.asarray(distance / ((band.right - band.left)[:, None] / 2))
 
     def _score(self, planes: Planes, weight: Floats) -> Floats:

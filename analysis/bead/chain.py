@@ -13,10 +13,11 @@ def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int6
     `score`, (n, rows, columns), marks forbidden places by -inf. Chains are gathered from both ends
     at once, which takes half the steps, until they meet in the middle row.
     """
-    machine = loaded(loops.chains)
-    if machine is not None:
-        found: NDArray[np.int64] = machine(score, np.float32(move_cost))
-        return found
+    found = (loaded(loops.chains) or _chains)(score, np.float32(move_cost))
+    return np.asarray(found)
+
+
+def _chains(score: NDArray[np.float32], cost: np.float32) -> NDArray[np.int64]:
     count, rows, columns = score.shape
     middle = (rows - 1) // 2
     values = np.zeros((rows - middle, 2, count, columns + 2), dtype=np.float32)
@@ -24,7 +25,6 @@ def best_chains(score: NDArray[np.float32], move_cost: float) -> NDArray[np.int6
     inner = values[..., 1:-1].swapaxes(0, 2)
     inner[:, 0, -1 - middle :] = score[:, : middle + 1]
     inner[:, 1, :-1] = score[:, :middle:-1]
-    cost = np.float32(move_cost)
     flat = values.reshape(len(values), -1)
     less, same, more = flat[:, :-2], flat[:, 1:-1], flat[:, 2:]
     best = np.empty_like(same[0])

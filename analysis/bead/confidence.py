@@ -83,6 +83,7 @@ def tint(e: Evidence) -> tuple[float, str]:
 
 
 def _less_sharp(e: Evidence) -> float:
+    """0 for toes that are surely ones, 1 for those a px more blurred."""
     return float(np.clip(e.blur_px - _sharp_px(e.width_px), 0, 1))
 
 
@@ -91,6 +92,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
     e = evidence
     less_sharp = _less_sharp(e)
     tinted, looks_tinted = tint(e)
+    nested = max(e.nested, less_sharp) if e.nested else 0.0
     found = [
         (e.apart / 1.2, "bead and plate look alike at a toe"),
         (e.band / 0.6, "hardly any band differs from both its sides"),
@@ -101,7 +103,7 @@ def doubts(evidence: Evidence) -> list[Doubt]:
         (e.step_grey / 8, f"a toe's step is {e.step_grey:.1f} grey levels only"),
         (e.lengths / 10, f"it is {e.lengths:.1f} times as long as wide: a bead is longer"),
         (
-            max(0.45, 1 - max(e.nested, less_sharp * (e.nested > 0)) * (0.5 + 0.5 * less_sharp)),
+            max(0.45, 1 - nested * (0.5 + 0.5 * less_sharp)),
             "it lies inside a broader band that is as evident: a heat tint?",
         ),
         (1 - 0.75 * tinted, looks_tinted),

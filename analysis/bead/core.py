@@ -57,9 +57,8 @@ def band_inside(
     band = search.best(central.astype(np.float32))
     if band is None:
         return None
-    rows = (np.arange(band.first, band.last + 1) * _ALONG).clip(0, len(line.s) - 1)
-    offsets = strip.offset((band.left + band.right) / 2 - 0.5)
-    points = line.points[rows] + offsets[:, None] * line.normals[rows]
+    rows = np.arange(band.first, band.last + 1) * _ALONG
+    points = strip.places(rows, band.middle - 0.5)
     return points, median(band.right - band.left) / 2 * step
 
 
@@ -104,14 +103,14 @@ def flank_texture(
         for out in (inward, -inward)
     ]
     inside_left, beyond_left, inside_right, beyond_right = _detail(photo, sides, reach_px)
-    return max(inside_left / beyond_left, inside_right / beyond_right)
+    pairs = ((inside_left, beyond_left), (inside_right, beyond_right))
+    return max(inside / beyond if np.isfinite(beyond) else 0.0 for inside, beyond in pairs)
 
 
 def _detail(photo: Photo, groups: Sequence[Points], reach_px: float) -> list[float]:
     """Typical detail finer than `reach_px` at each group of places; inf off the photo."""
-    size = np.array([photo.width_px, photo.height_px])
     places = [np.rint(group).astype(np.int64) for group in groups]
-    seen = [group[((group >= 0) & (group < size)).all(axis=1)] for group in places]
+    seen = [group[photo.holds(group)] for group in places]
     every = np.concatenate(seen)
     if not len(every):
         return [np.inf] * len(seen)

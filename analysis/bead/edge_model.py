@@ -83,6 +83,7 @@ def profiles_at(signal: Projected, centre: Rows, window: Window) -> Projected:
 
 
 def _profiles(signal: Projected, centre: Rows, outside: int, size: int) -> Projected:
+    """As `profiles_at`: `size` columns from `outside` before it, of (stack, rows, width)."""
     stack, rows, width = signal.shape
     columns = np.minimum(
         np.maximum(centre[:, None] + np.arange(-outside, size - outside), 0), width - 1

@@ -256,6 +256,7 @@ def _vertices(values: Profiles, shifts: Floats, power: int) -> tuple[Floats, Flo
 
 
 def _vertices_of(values: Profiles, shifts: Floats, power: int) -> tuple[Floats, Floats, Floats]:
+    """As `_vertices`, of values (n, shifts)."""
     count, last = values.shape
     at = np.minimum(np.maximum(np.argmax(values, axis=1), 1), last - 2)
     flat = at + np.arange(count) * last

@@ -22,7 +22,8 @@ class Photo:
     """A decoded photo, upright.
 
     `pixels` has shape (rows, columns) for grey or (rows, columns, 3) for B, G, R; uint8 or uint16.
-    Pixel centres lie at whole numbers; x_px counts columns, y_px rows.
+    Pixel centres lie at whole numbers; x_px counts columns, y_px rows. What `reduced` has made is
+    kept for the next who asks.
     """
 
     pixels: NDArray[Any]
@@ -38,6 +39,11 @@ class Photo:
     def width_px(self) -> int:
         """Columns."""
         return int(self.pixels.shape[1])
+
+    def holds(self, px: NDArray[Any]) -> NDArray[np.bool_]:
+        """Which of the places px (n, 2), x and y, lie between the centres of its pixels."""
+        last = (self.width_px - 1, self.height_px - 1)
+        return np.asarray(((px >= 0) & (px <= last)).all(axis=1))
 
     def reduced(self, factor: int) -> NDArray[Any]:
         """Pixels at 1 / factor of the size, a power of two: means of whole blocks.

@@ -71,7 +71,7 @@ def projected(base: Floats, slope: Floats, count: int) -> tuple[Floats, Floats]:
 
 
 def chains(score: Floats, cost: np.float32) -> Rows:
-    """As `chain.best_chains`."""
+    """As `chain._chains`."""
     count, rows, columns = score.shape
     middle = (rows - 1) // 2
     steps = rows - middle
@@ -149,7 +149,7 @@ def gathered(
 
 
 def walked_back(states: Floats, end: int, moves: Rows, costs: Floats) -> Rows:
-    """As `band._walk_back`, the states from the last to the first; `states` (rows, states)."""
+    """As `band._walked_back`."""
     found = np.empty(len(states), dtype=np.int64)
     found[0] = end
     count = 1
@@ -234,7 +234,7 @@ def contrasted(
 def counted(
     looks: Rows, first: Rows, end: Rows, valid: NDArray[np.bool_], bins: int
 ) -> NDArray[np.int64]:
-    """How often each look occurs in the columns [first, end) of each row that are valid."""
+    """As `zones.Looks.shares` counts: each look in the columns [first, end) that are valid."""
     rows, columns = valid.shape
     found = np.zeros(bins, dtype=np.int64)
     for row in range(rows):
@@ -247,7 +247,7 @@ def counted(
 def looked_up(
     colours: Rows, texture: Rows, by_colour: Floats, by_texture: Floats, most: np.float32
 ) -> Floats:
-    """As `zones.looked_up`."""
+    """As `zones._looked_up`."""
     found = np.empty(len(colours), dtype=np.float32)
     for place in range(len(colours)):
         value = by_colour[colours[place]] + by_texture[texture[place]]

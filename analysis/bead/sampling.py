@@ -41,6 +41,12 @@ class Strip:
         """Offset of a (fractional) column."""
         return np.asarray(self.offsets[0] + column * self.step)
 
+    def places(self, rows: NDArray[np.int64], columns: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places in the plane, (n, 2), of rows (the last one for those beyond) and columns."""
+        rows = np.minimum(rows, len(self.line.s) - 1)
+        across = self.offset(columns)[:, None] * self.line.normals[rows]
+        return np.asarray(self.line.points[rows] + across)
+
 
 def sample_strip(
     photo: Photo, plane: Plane, line: Centreline, reach: float, step: float, blur: float = 1.0
@@ -48,7 +54,7 @@ def sample_strip(
     """Sample the photo along `line`, `reach` to both sides, every `step` across.
 
     `blur` is the length of a step in photo px: from 2 on the photo is halved, as often as samples
-    still lie at most two of its pixels apart.
+    still lie at least one of its pixels apart.
     """
     count = int(np.ceil(reach / step))
     offsets = np.arange(-count, count + 1, dtype=np.float64) * step

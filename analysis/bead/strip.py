@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from seamlog.errors import EvidenceError, ImageError
 
-from .band import Band, BandSearch, relative
 from .confidence import may_be_tint, soft_px
 from .core import band_inside, flank_texture, softness
 from .curve import Centreline, arc_length, fit_centreline
-from .features import smoothed, strip_features
+from .features import strip_features
+from .given_path import BandPath, given_paths
 from .image import Photo
 from .measurement import TOES, BeadMeasurement
-from .path import NESTED, find_paths
+from .path import find_paths
 from .plane import Plane, Points
 from .refine import Rough, longest_px, refine_toes
 from .sampling import Strip, sample_strip
@@ -35,29 +35,11 @@ _ENOUGH = 40
 """Stations from which on a band inside is looked for."""
 _BEYOND = {"metal": 0.06, "outer": 0.25}
 """Half widths beside a toe, by its definition, that are neither bead nor plate at first."""
-_ASIDE = 0.03
-"""How far beside the bead a given path may run, as a part of the columns looked at."""
 _ROWS_AVERAGED = 4.0
 """Rows in the longest averaging (Gaussian sigma) that are enough: neighbours tell the same."""
 _PAST, _LOST = 2.0, 0.5
 """Half widths that a path is longer than the bead, as only past its end can be seen that it ends,
 and that each tracing adds at the ends: a stiff curve loses as much when it is moved to the toes."""
-_COLUMNS, _SECTIONS = 60, 48
-"""Columns to each side of a given path, and sections, in which the band is looked for."""
-_LONG = 0.25
-"""Reach to each side, in lengths of a path that lies in the photo as a whole: beads are longer than
-wide, and what is broader is the plate on its table."""
-_AROUND = 8.0
-"""Half widths to each side of a given path that show a band well."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Path:
-    """A path in the plane's unit with the bead's rough half width and how evident it was."""
-
-    points: Points
-    half: float
-    band: BandEvidence
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +64,11 @@ class _Traced:
     half: float
     toes: tuple[Toes, Toes]
 
+    @property
+    def blur_px(self) -> float:
+        """Blur of the sharper toe."""
+        return min(toe.blur_px for toe in self.toes)
+
 
 def measure_strip(
     photo: Photo,
@@ -99,7 +86,7 @@ def measure_strip(
     beyond = _BEYOND[toe]
     if prior is not None:
         sparse = _Tracing(40, 6, (0.45,), beyond)
-        measured = _most_trusted(photo, plane, _given_paths(photo, plane, prior), start, sparse)
+        measured = _most_trusted(photo, plane, given_paths(photo, plane, prior), start, sparse)
     else:
         dense = _Tracing(40, 1, (0.45, 0.35, 0.25), beyond)
         measured = _most_trusted(photo, plane, _found_paths(photo, plane), start, dense)
@@ -107,7 +94,7 @@ def measure_strip(
 
 
 def _most_trusted(
-    photo: Photo, plane: Plane, paths: Sequence[_Path], start: str | None, tracing: _Tracing
+    photo: Photo, plane: Plane, paths: Sequence[BandPath], start: str | None, tracing: _Tracing
 ) -> BeadMeasurement:
     """The first measurement that can be trusted, else the one with the least doubt."""
     best: BeadMeasurement | None = None
@@ -131,13 +118,12 @@ def _most_trusted(
 
 
 def _measure(
-    photo: Photo, plane: Plane, found: _Path, start: str | None, tracing: _Tracing
+    photo: Photo, plane: Plane, found: BandPath, start: str | None, tracing: _Tracing
 ) -> BeadMeasurement:
     unit = plane.unit_per_px(plane.to_px(found.points))
     traced = _traced(photo, plane, found.points, found.half, unit, tracing)
     band = found.band
-    blur_px = min(toe.blur_px for toe in traced.toes)
-    if may_be_tint(band.inner, blur_px, 2 * traced.half / unit):
+    if may_be_tint(band.inner, traced.blur_px, 2 * traced.half / unit):
         flank = flank_texture(photo, plane, traced.line, traced.toes, unit)
         sharper = _sharper_inside(photo, plane, traced, unit, tracing)
         band = replace(band, flank=flank, sharper=sharper)
@@ -148,9 +134,9 @@ def _traced(
     photo: Photo, plane: Plane, points: Points, half: float, unit: float, tracing: _Tracing
 ) -> _Traced:
     _refuse_narrow(photo, 2 * half / unit)
-    path = points
+    path, by = points, _PAST
     for freedom in tracing.freedoms:
-        path = _extended(photo, plane, path, half, _PAST if path is points else _LOST)
+        path, by = _extended(photo, plane, path, half, by), _LOST
         strip, extent = _straighten(photo, plane, path, half, unit, freedom, tracing)
         middle = _middle(strip, extent)
         path = strip.line.shifted(middle)
@@ -167,7 +153,7 @@ def _sharper_inside(
     photo: Photo, plane: Plane, traced: _Traced, unit: float, tracing: _Tracing
 ) -> float:
     """How many times sharper a band inside is than the toes, each at its weaker side."""
-    if min(toe.blur_px for toe in traced.toes) <= soft_px(2 * traced.half / unit):
+    if traced.blur_px <= soft_px(2 * traced.half / unit):
         return 0.0
     rows = np.flatnonzero(traced.toes[0].present > 0)
     if len(rows) < _ENOUGH:
@@ -189,7 +175,7 @@ def _extended(photo: Photo, plane: Plane, path: Points, half: float, by: float) 
     beyond = np.arange(0.1, by + 0.01, 0.1)[:, None] * half
     before = path[0] + beyond * _heading(path[::-1], 3 * half)
     after = path[-1] + beyond * _heading(path, 3 * half)
-    before, after = (more[_in_photo(photo, plane.to_px(more))] for more in (before, after))
+    before, after = (more[photo.holds(plane.to_px(more))] for more in (before, after))
     return np.concatenate([before[::-1], path, after])
 
 
@@ -199,11 +185,6 @@ def _heading(path: Points, over: float) -> Points:
     back = min(int(np.searchsorted(length, length[-1] - over)), len(path) - 2)
     away = path[-1] - path[back]
     return np.asarray(away / max(float(np.hypot(*away)), 1e-9))
-
-
-def _in_photo(photo: Photo, px: Points) -> NDArray[np.bool_]:
-    inside = (px >= 0).all(axis=1) & (px <= (photo.width_px - 1, photo.height_px - 1)).all(axis=1)
-    return np.asarray(inside)
 
 
 def _refuse_narrow(photo: Photo, width_px: float) -> None:
@@ -222,85 +203,14 @@ def _row_step(plane: Plane, half: float, unit: float) -> tuple[int, float]:
     return count, station / count
 
 
-def _found_paths(photo: Photo, plane: Plane) -> list[_Path]:
+def _found_paths(photo: Photo, plane: Plane) -> list[BandPath]:
     paths = []
     for coarse in find_paths(photo):
         half = float(np.median(coarse.half_width_px)) * plane.unit_per_px(coarse.centre_px)
         evidence = float(coarse.evidence.mean())
         band = BandEvidence(evidence, coarse.rival, coarse.inner, float(coarse.nested))
-        paths.append(_Path(plane.to_plane(coarse.centre_px), half, band))
+        paths.append(BandPath(plane.to_plane(coarse.centre_px), half, band))
     return paths
-
-
-def _given_paths(photo: Photo, plane: Plane, prior: Points) -> list[_Path]:
-    """Bands around a given path; one of a few columns only is looked for again from nearer."""
-    prior = _inside_photo(photo, plane, np.asarray(prior, dtype=np.float64))
-    unit = plane.unit_per_px(plane.to_px(prior))
-    length = float(arc_length(prior)[-1])
-    longest = _LONG if _ends_inside(photo, plane, prior, 0.1 * length) else 0.5
-    reach = min(0.5 * min(photo.width_px, photo.height_px) * unit, longest * length)
-    found = _bands_along(photo, plane, prior, reach, unit)
-    nearer = _AROUND * found[0].half if found else reach / _AROUND
-    if nearer < 0.5 * reach:
-        found = _bands_along(photo, plane, prior, nearer, unit) or found
-    if not found:
-        raise EvidenceError(
-            f"{photo.name}: no bead can be told from the plate along the given path; check that "
-            "the photo and its calibration belong to this weld"
-        )
-    return found
-
-
-def _bands_along(
-    photo: Photo, plane: Plane, prior: Points, reach: float, unit: float
-) -> list[_Path]:
-    """The band within `reach` of a path, and one in it that may be the bead instead.
-
-    At a resolution at which the path's wander does not matter.
-    """
-    step = max(unit, reach / _COLUMNS)
-    line = fit_centreline(prior, step, 6 * step)
-    strip = sample_strip(photo, plane, line, reach, step, blur=step / unit)
-    features = strip_features(strip.opponent, 1.5)
-    every = max(2, -(-len(features) // _SECTIONS))
-    sections = smoothed(features, 0, 0.7 * every)[every // 2 :: every]
-    columns = features.shape[1]
-    held = (columns / 2, _ASIDE * columns)
-    search = BandSearch(sections, 3.0, 0.7 * columns, held=held)
-
-    def along(band: Band, inner: float, nested: float) -> _Path:
-        rows = np.arange(band.first, band.last + 1) * every + every // 2
-        rows = rows.clip(0, len(line.s) - 1)
-        middle = strip.offset((band.left + band.right) / 2 - 0.5)
-        points = line.points[rows] + middle[:, None] * line.normals[rows]
-        half = median(band.right - band.left) / 2 * step
-        return _Path(points, half, BandEvidence(float(band.evidence.mean()), 0.0, inner, nested))
-
-    band = search.best()
-    if band is None:
-        return []
-    inside = search.inside(band)
-    inner = relative(inside, band)
-    paths = [along(band, inner, 0.0)]
-    if inside is not None and inner >= NESTED:
-        paths.append(along(inside, relative(search.inside(inside), inside), 1.0))
-    return paths
-
-
-def _ends_inside(photo: Photo, plane: Plane, path: Points, margin: float) -> bool:
-    """Whether both ends are `margin` away from the photo's frame."""
-    ends = plane.to_px(path[[0, -1]])
-    away = margin / plane.unit_per_px(ends)
-    return bool(_in_photo(photo, ends - away).all() and _in_photo(photo, ends + away).all())
-
-
-def _inside_photo(photo: Photo, plane: Plane, prior: Points) -> Points:
-    inside = _in_photo(photo, plane.to_px(prior))
-    if inside.sum() < 2:
-        raise EvidenceError(
-            f"{photo.name}: the given path does not run through the photo; check the calibration"
-        )
-    return prior[inside]
 
 
 def _middle(strip: Strip, extent: Extent) -> Floats:

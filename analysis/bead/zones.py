@@ -64,6 +64,15 @@ class Zone:
 
 
 @dataclass(frozen=True, slots=True)
+class Shares:
+    """How often each look of colours and of texture occurs in a zone, smoothed; its places."""
+
+    colours: Floats
+    texture: Floats
+    places: int
+
+
+@dataclass(frozen=True, slots=True)
 class Looks:
     """How each place of a strip looks: the bin of its colours together and that of its texture.
 
@@ -74,7 +83,7 @@ class Looks:
     channels: int
     texture: Places
 
-    def shares(self, zone: Zone) -> "Shares":
+    def shares(self, zone: Zone) -> Shares:
         """How often each look occurs in a zone."""
         count = loaded(loops.counted)
         if count is not None:
@@ -87,7 +96,7 @@ class Looks:
             texture = np.bincount(self.texture.take(at), minlength=_BINS)
         return Shares(_shares(colours, self.channels), _shares(texture, 1), int(texture.sum()))
 
-    def likeness(self, inside: "Shares", outside: "Shares") -> NDArray[np.float32]:
+    def likeness(self, inside: Shares, outside: Shares) -> NDArray[np.float32]:
         """Log-likelihood ratio inside : outside per place (n,), by the shares in two zones.
 
         Texture weighs less than colours. Clipped, so that no place decides alone.
@@ -97,15 +106,6 @@ class Looks:
         look_up = loaded(loops.looked_up) or _looked_up
         found = look_up(self.colours, self.texture, colours, texture, np.float32(_CLIP))
         return np.asarray(found)
-
-
-@dataclass(frozen=True, slots=True)
-class Shares:
-    """How often each look of colours and of texture occurs in a zone, smoothed; its places."""
-
-    colours: Floats
-    texture: Floats
-    places: int
 
 
 def _looked_up(

@@ -28,6 +28,8 @@ _GLEAM = 0.25
 _KNOWN = 0.3
 """Part of those rows that must be bead."""
 _UNKNOWN = 1e9
+_COARSE = 1.3
+"""Px of the halved photo to a step from which on its noise is averaged away first."""
 _MARGIN = 0.06
 """Part of the width beside each toe that is left out."""
 
@@ -65,7 +67,7 @@ def straightened(photo: Photo, plane: Plane, bead: BeadMeasurement) -> StraightB
     path = plane.to_plane(bead.centre_px[known])
     line = fit_centreline(path, step, _STIFF * width)
     blur = step / bead.unit_per_px
-    if blur > 1.3 * 2 ** np.floor(np.log2(blur)):  # more than halving the photo averages away
+    if blur > _COARSE * 2 ** np.floor(np.log2(blur)):
         photo = make_photo(cv2.GaussianBlur(photo.pixels, (0, 0), 0.4 * blur), photo.name)
     strip = sample_strip(photo, plane, line, 0.75 * width, step, blur=blur)
     light = np.ascontiguousarray(strip.opponent[..., 0])

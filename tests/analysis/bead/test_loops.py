@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seamlog.analysis.bead.assess import assess_photos
 from seamlog.analysis.bead.band import BandSearch
 from seamlog.analysis.bead.chain import best_chains
 from seamlog.analysis.bead.edge_model import moved, profiles_at
@@ -16,6 +17,7 @@ from seamlog.analysis.bead.image import make_photo
 from seamlog.analysis.bead.loops import as_machine_code, chains, loaded
 from seamlog.analysis.bead.measurement import BeadMeasurement
 from seamlog.analysis.bead.plane import plane_of
+from seamlog.analysis.bead.sources import PhotoSource
 from seamlog.analysis.bead.strip import measure_strip
 from seamlog.analysis.bead.synthetic import Scene, SyntheticBead, render
 
@@ -104,6 +106,23 @@ def test_the_same_profiles(seed: int) -> None:
         both(peak, np.round(signal, 1), np.arange(40.0)),
     ):
         assert np.array_equal(plain, compiled)
+
+
+@pytest.mark.parametrize("many", [2, 3])
+def test_many_photos_are_measured_by_machine_code(
+    monkeypatch: pytest.MonkeyPatch, many: int
+) -> None:
+    used = set()
+
+    def detector(*given: Any, **options: Any) -> BeadMeasurement:
+        used.add(loaded(chains) is not None)
+        return measure_strip(*given, **options)
+
+    monkeypatch.setattr("seamlog.analysis.bead.assess.MANY", many)
+    monkeypatch.setattr("seamlog.analysis.bead.part.load", lambda *_: detector)
+    bead = render(SCENES["plain"], 3)
+    assess_photos([PhotoSource(make_photo(bead.pixels, each), None, ()) for each in "ab"])
+    assert used == {many == 2}
 
 
 def test_machine_code_is_used_within_its_block_only(monkeypatch: pytest.MonkeyPatch) -> None:
